@@ -164,6 +164,22 @@ def test_streams_follow_their_targets(program: Program, arm: Arm) -> None:
         program.done("stopDirectServoJoints")
 
 
+def test_a_stop_of_somebody_else_is_not_undone_by_the_next_target(program: Program, arm: Arm) -> None:
+    program.done("startDirectServoJoints", f"jp_{joined(HOME)}", f"jp_{joined(NEAR)}")
+    deadline = time.monotonic() + PATIENCE
+    while not np.abs(arm.state.dq).max() > 0.01:
+        assert time.monotonic() < deadline
+    arm.stop()
+    rest = arm.wait_for_rest(timeout=PATIENCE)
+    for _ in range(20):
+        assert program.ask(f"jp_{joined(HOME)}") == "nak"
+    assert off(arm.state.q.tolist(), rest.q.tolist()) < 1e-3
+    program.done("stopDirectServoJoints", "startDirectServoJoints")
+    while off(program.numbers(f"jpJP_{joined(NEAR)}"), NEAR) > 1e-3:
+        assert time.monotonic() < deadline
+    program.done("stopDirectServoJoints")
+
+
 def test_tool_signals_and_state(program: Program, arm: Arm) -> None:
     program.done("TFtrans_0_0_100_0_0_0")
     assert (
@@ -181,6 +197,7 @@ def test_tool_signals_and_state(program: Program, arm: Arm) -> None:
 def test_refused_lines_and_garbage_change_nothing(program: Program) -> None:
     for line in (
         "doSomethingElse",
+        "doPTP!inJSinf_0_1",
         "jRelVel_abc_",
         "jp_1_2_3",
         "TFtrans_1_2",
@@ -239,6 +256,11 @@ def test_a_bridge_that_stood_still_takes_control_again_unless_another_has_it(cab
             stands_still()
             bridge.send_signal(signal.SIGCONT)
             assert program.move("doPTPinJS") == "done", "it has taken control again"
+            program.done("jRelVel_0.02_", f"jp_{joined(NEAR)}", "doPTPinJS")
+            stands_still()
+            bridge.send_signal(signal.SIGCONT)
+            assert program.answers.readline().strip() == "nak", "the motion was ended, the bridge was not"
+            program.done("jRelVel_0.5_")
             stands_still()
             other.take_control()
             bridge.send_signal(signal.SIGCONT)
@@ -250,4 +272,4 @@ def test_a_bridge_that_stood_still_takes_control_again_unless_another_has_it(cab
             bridge.send_signal(signal.SIGCONT)
             bridge.send_signal(signal.SIGINT)
             said = bridge.stdout.read()
-    assert said.count("took it again") == 2 and "controls the robot" in said, said
+    assert said.count("took it again") == 3 and "controls the robot" in said, said

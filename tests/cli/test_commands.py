@@ -11,13 +11,19 @@ import sys
 import threading
 import zipfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 
+import heptarm as ha
+from heptarm.cli.demo import demo
+from heptarm.cli.options import CommandTarget
+from heptarm.cli.output import answer_of, confirm
 from heptarm.io.panel_box import PanelBox, PlanOutline
+from heptarm.values.robot import robot
 from heptarm.wire.messages import MAJOR, MINOR
 from tests.cli.running import HEPTARM, objects, refused, run, sim
 from tests.conftest import RunningCabinet
@@ -329,3 +335,20 @@ def test_demo_goes_as_designed_and_saves_a_plot(tmp_path: Path) -> None:
     ]
     assert all(one["as_designed"] for one in steps)
     assert plot.read_bytes().startswith(b"\x89PNG") and plot.stat().st_size > 20_000
+
+
+def test_the_demo_moves_no_real_robot(monkeypatch: pytest.MonkeyPatch) -> None:
+    arm = Mock(robot=robot("iiwa14"), is_virtual=False)
+    monkeypatch.setattr(CommandTarget, "connect", lambda *_, **__: nullcontext(arm))
+    with pytest.raises(ha.CommandRejected, match="must be a virtual arm, got the real LBR iiwa 14"):
+        demo(target=CommandTarget(text="172.31.1.147"))
+    arm.move.assert_not_called()
+
+
+def test_the_end_of_the_terminal_is_no(monkeypatch: pytest.MonkeyPatch) -> None:
+    def ended(_: str) -> str:
+        raise EOFError
+
+    monkeypatch.setattr("sys.stdin", Mock(isatty=lambda: True))
+    monkeypatch.setattr("builtins.input", ended)
+    assert not confirm("Move the real robot?") and answer_of("success?") == ""

@@ -24,3 +24,5 @@ def test_taught_and_replayed(tmp_path: Path) -> None:
         assert again["cause"] == "finished" and again["deviation_rad"] < 0.05
         refused = run("replay", str(tmp_path / "none.npz"), *target)
         assert refused.returncode == 1 and "none.npz" in refused.stderr
+        refused = run("replay", str(file), "--speed-scaling", "0", *target)
+        assert refused.returncode == 1 and "--speed-scaling must be in (0, 100], got 0" in refused.stderr

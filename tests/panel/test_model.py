@@ -25,7 +25,7 @@ from heptarm.errors import (
 from heptarm.model.kinematics import forward
 from heptarm.panel.jog import Jog, JointJog, PoseJog, TwistJog
 from heptarm.panel.model import PanelArm
-from heptarm.panel.process import PanelOptions, model_of
+from heptarm.panel.process import PanelOptions, model_of, shapes_of
 from heptarm.record.mcap_file import RecordingFile
 from heptarm.sim.plant.scene import Scene
 from heptarm.values.pose import Pose
@@ -259,12 +259,17 @@ def test_what_is_too_fast_is_refused(make: Callable[[], Jog]) -> None:
 # ------------------------------------------------------------------------------------------ stopping
 
 
-def test_stop_works_without_control(model: PanelArm, observer: ha.Arm) -> None:
+def test_stop_works_without_control(
+    model: PanelArm, observer: ha.Arm, monkeypatch: pytest.MonkeyPatch
+) -> None:
     model.release_control()
     with ha.connect(address(model), name="program", watchdog=5.0, timeout=PATIENCE) as program:
         handle = program.start(ha.ptp(ha.deg(90, 30, 0, -90, 0, 60, 0), speed=0.05))
         observer.wait_until(lambda state: state.q[0] > 0.02, timeout=PATIENCE)
+        ended: list[str] = []
+        monkeypatch.setattr(model.wizard, "end", lambda: ended.append("a measurement"))
         model.stop()
+        assert ended, "between two of its motions there is none that could be stopped"
         with pytest.raises(MotionAborted):
             handle.wait(timeout=PATIENCE)
         assert observer.wait_for_rest(timeout=PATIENCE).q[0] < 1.0
@@ -461,6 +466,9 @@ def test_a_gripper_is_that_of_the_options_or_of_the_scene(model: PanelArm) -> No
     assert bins.gripper is not None
     assert model_of(model.arm, target, PanelOptions(scene="bins", read_only=True)).gripper is None
     assert model_of(model.arm, target, PanelOptions()).gripper is None
+    for options, why in ((PanelOptions(scene="none"), "none"), (PanelOptions(meshes="nowhere"), "nowhere")):
+        with pytest.raises(CommandRejected, match=why):
+            shapes_of(options)
     with pytest.raises(CommandRejected, match="signals of a gripper must be"):
         model_of(model.arm, target, PanelOptions(gripper="fingers=DO1"))
     with pytest.raises(CommandRejected, match="Nothing"):

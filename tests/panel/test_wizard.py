@@ -88,6 +88,28 @@ def test_a_load_is_shown_agreed_to_measured_and_saved(arm: ha.Arm) -> None:
     assert person.wizard.step.is_saved and "<small>saved" in texts.wizard(person.wizard.step)
 
 
+@pytest.mark.parametrize("how", ["Give up", "STOP", "the page is closed"])
+def test_what_is_given_up_between_two_motions_moves_no_more(arm: ha.Arm, how: str) -> None:
+    person = Person(arm)
+    person.wizard.begin("load", WizardSettings(speed=1.0, seconds=4.0))
+    person.sees(lambda step: step.asks)
+    person.wizard.go_on()
+    arm.wait_until(lambda state: state.motion.active, timeout=PATIENCE)
+    arm.wait_until(lambda state: not state.motion.active, timeout=PATIENCE)  # it measures a rest
+    rest = arm.wait_for_rest(timeout=PATIENCE).q_cmd
+    if how == "STOP":
+        person.wizard.end()  # as the panel does
+        arm.stop()
+    else:
+        person.wizard.give_up() if how == "Give up" else person.wizard.close()
+    person.sees(lambda step: not step.is_running)
+    assert "given up, nothing moves any more" in str(person.errors.pop())
+    assert np.abs(arm.state.q_cmd - rest).max() < 1e-6
+    with pytest.raises(CommandRejected, match="no measurement runs"):
+        person.wizard.give_up()
+    arm.move(ha.ptp(HOME))
+
+
 def test_a_tip_from_poses_that_a_person_confirms(arm: ha.Arm) -> None:
     person, home = Person(arm), ha.Pose.from_matrix(kinematics.forward(arm.robot, HOME))
     person.wizard.begin("poses", WizardSettings(count=4))

@@ -53,6 +53,7 @@ class BridgedArm:
         self._again: Callable[[], object] | None = None
         self._ended = threading.Event()  # ends the thread that sends the newest target again
         self._fired: Condition | None = None
+        self._stopped = ""  # why somebody else, or the safety controller, ended the stream
 
     def in_control(self, carry_out: Callable[[], object]) -> None:
         """Carry out a command of the program; take control again before, if it was lost and nobody else has taken it.
@@ -85,7 +86,7 @@ class BridgedArm:
             HeptarmError: refused; the text gives the reason.
         """
         self._end_stream()
-        self._fired = None
+        self._fired, self._stopped = None, ""
         self._handle = self.arm.start(motion, mode=mode, until=until, when="replace")
         return self._handle
 
@@ -124,7 +125,8 @@ class BridgedArm:
             settings: keywords of `Arm.servo`; called when this target opens a servo motion.
 
         Raises:
-            HeptarmError: refused; NotReady if a condition has ended the servo motion and `halt` was not called since.
+            HeptarmError: refused; NotReady if a condition, another client or a safety stop has ended the servo motion,
+                and `halt` was not called since.
         """
         with self._lock:
             if self._servo is None or self._kind != kind or not self._servo.active:
@@ -142,6 +144,11 @@ class BridgedArm:
             raise NotReady(
                 f"the servo motion was ended by its condition: {self._fired}",
                 hint="stop, or set the condition again",
+            )
+        if self._stopped:  # a program that goes on sending must not undo a stop
+            raise NotReady(
+                f"the arm was stopped: {self._stopped}",
+                hint="end the servo motion in the program, and begin it again",
             )
         self._end_motion()
         keywords = {"rate": _RATE, "watchdog": _WATCHDOG, **settings()}
@@ -176,10 +183,10 @@ class BridgedArm:
     # ------------------------------------------------------------------------------------- ends
 
     def halt(self) -> None:
-        """End what runs, and wait until it has ended; a condition that has fired counts no more."""
+        """End what runs, and wait until it has ended; a condition that has fired, or a stop, counts no more."""
         self._end_stream()
         self._end_motion()
-        self._handle = self._fired = None
+        self._handle, self._fired, self._stopped = None, None, ""
 
     def stop(self) -> None:
         """Stop the arm, whatever client moves it.
@@ -207,6 +214,8 @@ class BridgedArm:
                 servo.close()
             except HeptarmError as error:
                 _log.warning("the servo motion ended early: %s", error)
+                if getattr(error, "cause", None) in (Cause.STOPPED, Cause.SAFETY):
+                    self._stopped = error.text
             if servo.result is not None and servo.result.cause is Cause.CONDITION:
                 self._fired = servo.result.stopped_by
 

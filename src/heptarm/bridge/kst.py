@@ -93,7 +93,7 @@ class KstBridge:
             Whether the program goes on; False: it has said that it ends.
 
         Raises:
-            ConnectionLost: the cabinet cannot be reached, or the program has gone.
+            ConnectionLost: the cabinet cannot be reached.
         """
         text = line.strip()
         if not text:  # iiwaPy3 ends some lines twice
@@ -109,9 +109,10 @@ class KstBridge:
                     f"line must be one of KST's commands, got {line[:40]!r}", parameter="line"
                 )
             self._bridged.in_control(partial(command, self, values))
-        except ConnectionLost:
-            raise
-        except (HeptarmError, ValueError) as error:
+        except (HeptarmError, ValueError, OverflowError) as error:
+            # a motion that ends since control was lost ends so, too; the next command takes it again
+            if isinstance(error, ConnectionLost) and not self._bridged.arm.connected:
+                raise
             if str(error) != self._logged:  # a stream repeats it
                 self._logged = str(error)
                 _log.warning("KST's command %s is refused: %s", word[:40], error)

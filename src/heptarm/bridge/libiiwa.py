@@ -147,9 +147,10 @@ class LibiiwaBridge:
             if code in _RESETS:
                 self._bridged.halt()
             self._bridged.in_control(partial(command, self, arguments))
-        except ConnectionLost:
-            raise
         except HeptarmError as error:
+            # a motion that ends since control was lost ends so, too; the next command takes it again
+            if isinstance(error, ConnectionLost) and not self._bridged.arm.connected:
+                raise
             self._error = _error_of(error, code, synchronous=self._synchronous)
             self._log(f"libiiwa's command {code} is refused: {error}")
             return False

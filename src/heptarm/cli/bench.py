@@ -34,7 +34,7 @@ from heptarm.fri.loop.echo import floor
 from heptarm.fri.loop.user_api import State
 from heptarm.fri.protocol.messages import Quality
 from heptarm.values.checks import Array, within
-from heptarm.values.files import refuse_existing
+from heptarm.values.files import writable_file
 
 #: Messages kept for the picture.
 _KEPT = 120_000
@@ -108,7 +108,7 @@ def bench(
     seconds = within(duration, "duration", 0.1, 86400.0, unit="s")
     if plot is not None:
         require("matplotlib", extra="viz")
-        refuse_existing(plot, overwrite=overwrite, name="plot")
+        writable_file(plot, overwrite=overwrite, name="plot")
     kept = min(_KEPT, round(1.2 * seconds * 1e3 / max(fri_period, 1)) + 2000)
     settings = {"port": fri_port, "version": fri_version, "history": kept}
     if listen:

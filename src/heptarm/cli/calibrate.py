@@ -27,7 +27,7 @@ from heptarm.io.targets import saved_target
 from heptarm.model.kinematics import forward
 from heptarm.panel.points import PointList
 from heptarm.sim.collision import CollisionModel
-from heptarm.values.files import read_text, refuse_existing
+from heptarm.values.files import read_text, writable_file
 from heptarm.values.mode.compliance import compliance
 from heptarm.values.motion.hand_guiding import hand_guide
 from heptarm.values.motion.motion import hold
@@ -277,7 +277,7 @@ def arm(
         heptarm calibrate arm run.mcap --validate other.mcap --save my-arm.toml
     """
     if save is not None:
-        refuse_existing(save, overwrite=overwrite, name="save")
+        writable_file(save, overwrite=overwrite, name="save")
     if run is None:
         with access.target.connect(control=not dry_run, state_rate=RATE) as one:
             world = CollisionModel(one.robot.name)

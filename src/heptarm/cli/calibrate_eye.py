@@ -25,7 +25,7 @@ from heptarm.cli.record import (
 )
 from heptarm.errors import CommandRejected
 from heptarm.values.camera import Camera
-from heptarm.values.files import refuse_existing, unwritable
+from heptarm.values.files import unwritable, writable_file
 
 _ACCESS = Access()
 #: The value of `--camera` for a simulated camera.
@@ -137,7 +137,7 @@ def eye(
             hint="give --camera sim, or leave them out",
         )
     if out is not None:
-        refuse_existing(out, overwrite=overwrite, name="out")
+        writable_file(out, overwrite=overwrite, name="out")
     place = saved_as(save, access.target)
     matrix = _matrix(lens)
     own: dict[str, Any] = {} if camera == _SIMULATED else {"frame": frame}
@@ -164,12 +164,10 @@ def eye(
     }
     if place:
         found.save(place, save)
+    emit(result) if access.as_json else print(found)
     if out is not None:
         _write(out, result)
-    if access.as_json:
-        emit(result)
-    else:
-        print(found)
+    if not access.as_json:
         print(outcome("camera", save, place) if out is None or place else f"written to {out}")
     return 0
 

@@ -22,7 +22,7 @@ from heptarm.cli.options import (
 from heptarm.cli.output import confirm, emit
 from heptarm.errors import CommandRejected
 from heptarm.testing import Outcome, Report, Scenario, Verdict
-from heptarm.values.files import refuse_existing
+from heptarm.values.files import writable_file
 
 #: Longest wait for an answer [s]: a machine that also simulates may be late.
 _TIMEOUT = 20.0
@@ -108,7 +108,7 @@ def check(
             "--report needs --commission", parameter="report", hint="use --junit for a report on scenarios"
         )
     if junit is not None:
-        refuse_existing(junit, overwrite=overwrite, name="junit")
+        writable_file(junit, overwrite=overwrite, name="junit")
     chosen = testing.find(only)
     if noisy and target.or_else(None).text:
         raise CommandRejected(

@@ -27,7 +27,7 @@ from heptarm.testing.commissioning import (
     find_steps,
 )
 from heptarm.testing.stage import has_operator
-from heptarm.values.files import refuse_existing
+from heptarm.values.files import writable_file
 
 _TIMEOUT = 20.0
 _STYLES = {Agreement.AGREES: "green", Agreement.DIFFERS: "red", Agreement.SKIPPED: "yellow"}
@@ -67,7 +67,7 @@ def run(
     with target.connect(watchdog=CHECK.default, timeout=_TIMEOUT) as arm:
         base = file or Path(_default_name(arm))
         for suffix in ("md", "json"):
-            refuse_existing(_with(base, suffix), overwrite=overwrite, name="report")
+            writable_file(_with(base, suffix), overwrite=overwrite, name="report")
 
         def ended(report: CommissioningReport) -> None:
             _write(base, report)

@@ -26,7 +26,7 @@ from heptarm.cli.options import (
 from heptarm.cli.output import emit
 from heptarm.errors import CommandRejected, require
 from heptarm.values.checks import Array
-from heptarm.values.files import refuse_existing
+from heptarm.values.files import writable_file
 from heptarm.values.motion.line import lin, lin_rel
 from heptarm.values.motion.ptp import ptp
 from heptarm.values.pose import Pose, deg
@@ -92,12 +92,19 @@ def demo(
     logging.getLogger("heptarm").setLevel(logging.ERROR)
     if plot is not None:
         require("matplotlib", extra="viz")
-        refuse_existing(plot, overwrite=overwrite, name="plot")
+        writable_file(plot, overwrite=overwrite, name="plot")
     elif importlib.util.find_spec("matplotlib") is not None:
         plot = Path("heptarm-demo.png")
     began = time.monotonic()
     chosen = target if target.text else replace(target, text="sim://iiwa14")  # a robot only if it is named
     with chosen.connect(state_rate=_RATE) as arm:
+        if not arm.is_virtual:
+            raise CommandRejected(
+                f"--target must be a virtual arm, got the real {arm.robot.title}: the demo moves it far and fast",
+                parameter="target",
+                value=target.text,
+                hint="heptarm move asks before it moves a robot, at 10 % speed",
+            )
         ready = time.monotonic() - began
         recorder = _Recorder(arm)
         steps = [step(arm) for step in (_ptp, _lin, _lin_rel, _cancelled, _refused, _home)]

@@ -27,7 +27,7 @@ from heptarm.cli.plan import preview_data
 from heptarm.cli.progress import progress
 from heptarm.record.recording import load
 from heptarm.values.checks import within
-from heptarm.values.files import refuse_existing
+from heptarm.values.files import writable_file
 from heptarm.values.frames import BASE
 from heptarm.values.mode.compliance import compliance
 from heptarm.values.motion.hand_guiding import hand_guide
@@ -213,7 +213,7 @@ def teach(
         heptarm teach path.npz --free xy --seconds 20 --target lab1
     """
     limit = within(seconds, "seconds", 0.0, 86400.0, above=True, unit="s")
-    refuse_existing(out.with_suffix(".npz"), overwrite=overwrite, name="out")
+    writable_file(out.with_suffix(".npz"), overwrite=overwrite, name="out")
     mode = compliance(free, frame="base") if free else None
     with access.target.connect() as arm:
         if free:
@@ -275,6 +275,7 @@ def replay(
 
         heptarm replay run.mcap --target sim://iiwa14
     """
+    within(speed_scaling, "--speed-scaling", 0.0, 100.0, above=True)
     trajectory = _trajectory(file, arm_of, rate)
     with access.target.connect() as arm:
         access.ask_first(arm, f"Move the real {arm.robot.title} along {file}?")

@@ -47,10 +47,19 @@ def state_data(state: State) -> dict[str, Any]:
 
 
 def confirm(question: str) -> bool:
-    """Ask a person; no terminal means no."""
+    """Ask a person; no terminal means no, and so does its end."""
+    return answer_of(f"{question} [y/N] ").lower() in ("y", "yes")
+
+
+def answer_of(question: str) -> str:
+    """What a person types; "": there is no terminal, or it has ended (Ctrl-D)."""
     if not sys.stdin.isatty():
-        return False
-    return input(f"{question} [y/N] ").strip().lower() in ("y", "yes")
+        return ""
+    try:
+        return input(question).strip()
+    except EOFError:
+        print()
+        return ""
 
 
 def is_silent() -> bool:

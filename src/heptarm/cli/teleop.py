@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import asdict, replace
@@ -17,7 +16,7 @@ from heptarm.arm.arm import Arm
 from heptarm.arm.motion.servo import ServoStats
 from heptarm.cli.jog import DEVICES
 from heptarm.cli.options import COMMON, Access, CommandTarget
-from heptarm.cli.output import emit
+from heptarm.cli.output import answer_of, emit
 from heptarm.cli.record import numbers_of
 from heptarm.devices.pose_stream import PORT, PoseDevice, pose_stream
 from heptarm.errors import CommandRejected
@@ -237,9 +236,7 @@ def _moved(move: Callable[[], ServoStats]) -> ServoStats | None:
 
 def _label(episode: Episode) -> None:
     """Ask the person for the label; on no terminal it stays open."""
-    if not sys.stdin.isatty():
-        return
-    answer = input("[s]uccess, [f]ailure or [d]iscard? ").strip().lower()[:1]
+    answer = answer_of("[s]uccess, [f]ailure or [d]iscard? ").lower()[:1]
     if answer == "s":
         episode.succeed()
     elif answer == "f":

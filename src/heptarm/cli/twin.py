@@ -13,7 +13,7 @@ from heptarm.cli.options import Json, Overwrite
 from heptarm.cli.output import emit
 from heptarm.errors import CommandRejected
 from heptarm.twin.replay import replay_in_sim
-from heptarm.values.files import refuse_existing
+from heptarm.values.files import writable_file
 from heptarm.values.mode.impedance import CartesianImpedance
 
 
@@ -62,7 +62,7 @@ def twin(
     """
     for path, name in ((out, "out"), (save, "save")):
         if path is not None:
-            refuse_existing(path, overwrite=overwrite, name=name)
+            writable_file(path, overwrite=overwrite, name=name)
     names = tuple(name.strip() for name in signals.split(",") if name.strip())
     mode = None if stiffness is None else CartesianImpedance(stiffness={"xyz": stiffness})
     bands = dict(_band(text) for text in band)

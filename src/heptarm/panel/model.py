@@ -332,6 +332,7 @@ class PanelArm:
             HeptarmError: neither way reaches the cabinet.
         """
         self._jogger.bar()
+        self.wizard.end()
         try:
             self._halt()
         except HeptarmError:

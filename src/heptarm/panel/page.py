@@ -49,6 +49,7 @@ _STOPS = {
     "Safety stop": "protective_stop",
     "Drive error": "drive_error",
 }
+_RUN, _MEASUREMENT = "run", "measurement"
 _ACTIONS = {"Clear": "clear", "Start": "start", "Enable": "enable", "Release enabling": "release"}
 _MODES = {"T1": "t1", "T2": "t2", "AUT": "aut"}
 _PUSH = {"Push 20 N down, 2 s": "push 0 0 -20 2", "Push 30 N sideways, 2 s": "push 0 30 0 2"}
@@ -85,7 +86,7 @@ class ArmPage:
         self._world, self._bodies, self._marks, self._ghost, self._root = world, bodies, marks, ghost, root
         self._outline: WorldOutline | None = None
         self._points: tuple[Any, ...] = ()
-        self._client: int | None = None
+        self._pages: dict[str, int] = {}  # of runs and measurements: the page that has started the newest
         self._trail: tuple[int, ...] = ()
         self._outputs: dict[str, Any] = {}
         self._top = _SCALES[0]
@@ -335,7 +336,7 @@ class ArmPage:
             "Also keep", "", visible=False, hint="likewise, as in Python: OnLine((0.5, 0, 0.4), (0, 1, 0))"
         )
         self._drive = self._gui.add_button("Drive the path", color="orange", visible=False)
-        self._drive.on_click(self._runner(lambda: self.model.drive(places=self._world.places)))
+        self._drive.on_click(self._of_page(_RUN, lambda: self.model.drive(places=self._world.places)))
         self._follows.visible = False
         self._gizmo = self._server.scene.add_transform_controls(
             f"{self._root}/handle", scale=0.22, visible=False, depth_test=False
@@ -418,7 +419,7 @@ class ArmPage:
             ("Run all", self._run),
         ):
             handle = gui.add_button(label, color="orange")
-            handle.on_click(self._runner(action))
+            handle.on_click(self._of_page(_RUN, action))
         self._button("Preview", lambda: model.preview(speed=float(self._run_speed.value) / 100), color="gray")
         self._button("Cancel", model.end_run, color="gray")
         save = gui.add_button("Save", color="gray")
@@ -447,14 +448,18 @@ class ArmPage:
         point = tuple(points)[points.index(self._chosen.value)]
         points.approach(point.name, straight=not point.straight)
 
-    def _runner(self, action: Callable[[], None]) -> Callable[[Any], None]:
-        """What runs points, and remembers whose page has started it."""
+    def _of_page(self, what: str, action: Callable[[], object]) -> Callable[[Any], None]:
+        """What starts a run or a measurement, and remembers whose page has done so; a refused one has not."""
 
-        def run(event: Any) -> None:
-            self._client = event.client_id
-            self._do(action)
+        def start(event: Any) -> None:
+            try:
+                action()
+            except HeptarmError as error:
+                self.model.report(error)
+            else:
+                self._pages[what] = event.client_id
 
-        return run
+        return start
 
     def _run(self, *names: str) -> None:
         self.model.run(*names, speed=float(self._run_speed.value) / 100)
@@ -524,8 +529,8 @@ class ArmPage:
         self._measuring = gui.add_slider("Speed [%] ", 1, 100, 1, _SLOW)
         self._steps = gui.add_html("")
         self._seen = gui.add_image(np.zeros((3, 4, 3), np.uint8), visible=False, format="jpeg")
-        self._button("Begin", self._begin, color="blue")
-        self._button("Go on", wizard.go_on, color="orange")
+        for label, action, color in (("Begin", self._begin, "blue"), ("Go on", wizard.go_on, "orange")):
+            gui.add_button(label, color=color).on_click(self._of_page(_MEASUREMENT, action))
         self._button("Give up", wizard.give_up, color="red")
         self._saved = gui.add_text("Save as", "", hint="name of the tool or camera of the saved target")
         self._wide()
@@ -597,8 +602,11 @@ class ArmPage:
     def forget(self, client: int) -> None:
         """End what a page has started that was closed."""
         self.model.end_jog(client)
-        if self._client == client:  # it asks the cabinet, for which viser's event loop must not wait
-            threading.Thread(target=self._do, args=(self.model.end_run,), daemon=True).start()
+        for what, end in ((_RUN, self.model.end_run), (_MEASUREMENT, self.model.wizard.close)):
+            if (
+                self._pages.get(what) == client
+            ):  # it asks the cabinet, for which viser's event loop must not wait
+                threading.Thread(target=self._do, args=(end,), daemon=True).start()
 
 
 def _put(handle: Any, content: str) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 
 from heptarm.errors import CommandRejected
 from heptarm.io.panel_box import PlanOutline
-from heptarm.panel.process import RATE, PanelOptions, open_server
+from heptarm.panel.process import RATE, PanelOptions, open_server, shapes_of
 from heptarm.record.episodes import LABEL, NUMBER, REASON, TASK, episode_files
 from heptarm.record.recording import Recording, load
 from heptarm.values.checks import Array
@@ -94,15 +94,12 @@ class Player:
     ) -> None:
         self._t, self._q = _positions(recording)
         shadow = None if ghost is None else _positions(ghost)
+        meshes, scene = shapes_of(options)
         server, guard = open_server(options, {})
         from heptarm.panel.drawing import DrawnGhost, DrawnMarks, DrawnWorld
-        from heptarm.sim.plant.appearance import ArmMeshes
-        from heptarm.sim.plant.scene import Scene
 
         self.server = server
         self._robot = robot = recording.facts["robot"]
-        meshes = ArmMeshes.of(options.meshes)
-        scene = Scene.of(options.scene) if options.scene else None
         self._world = DrawnWorld(server, robot, scene, None, meshes, root="/arm")
         self._marks = DrawnMarks(server, "/arm")
         self._ghost = DrawnGhost(server, robot, meshes, "/arm")

@@ -40,6 +40,8 @@ from heptarm.wire.messages import StopKind
 
 if TYPE_CHECKING:
     from heptarm.arm.arm import Arm
+    from heptarm.sim.plant.appearance import ArmMeshes
+    from heptarm.sim.plant.scene import Scene
 
 #: Pictures per second, and every how many of them texts and plots are drawn [Hz].
 RATE, _TEXTS, _PLOTS = 25.0, 3, 6
@@ -86,6 +88,25 @@ class PanelOptions:
     def may_control(self) -> bool:
         """Whether a page may control the arms: on this machine, or with permission."""
         return not self.read_only and (is_local(self.host) or self.allow_control)
+
+
+def shapes_of(options: PanelOptions) -> tuple[ArmMeshes, Scene | None]:
+    """What is drawn of the arms, and around the first one.
+
+    Raises:
+        CommandRejected: there are no such meshes, or there is no such scene.
+    """
+    from heptarm.sim.plant.appearance import ArmMeshes
+    from heptarm.sim.plant.scene import Scene
+
+    try:
+        meshes = ArmMeshes.of(options.meshes)
+    except ValueError as error:
+        raise CommandRejected(str(error), parameter="meshes", value=options.meshes) from None
+    try:
+        return meshes, Scene.of(options.scene) if options.scene else None
+    except ValueError as error:
+        raise CommandRejected(str(error), parameter="scene", value=options.scene) from None
 
 
 def open_server(options: PanelOptions, pages: Mapping[str, Page]) -> tuple[Any, PageGuard]:
@@ -146,13 +167,8 @@ class Panel:
         require("viser", extra="viz")
         from heptarm.panel.drawing import DrawnBodies, DrawnGhost, DrawnMarks, DrawnWorld
         from heptarm.panel.page import ArmPage
-        from heptarm.sim.plant.appearance import ArmMeshes
-        from heptarm.sim.plant.scene import Scene
 
-        try:
-            meshes = ArmMeshes.of(options.meshes)
-        except ValueError as error:
-            raise CommandRejected(str(error), parameter="meshes", value=options.meshes) from None
+        meshes, surroundings = shapes_of(options)
         pages = {"/": self._frame, frame.STOP_PATH: self._answer_stop}
         self._is_light = options.light
         server, guard = open_server(options, pages)
@@ -169,7 +185,7 @@ class Panel:
         for number, model in enumerate(self._arms):
             root = f"/arm{number + 1}"
             server.scene.add_frame(root, show_axes=False, position=(0.0, _APART * number, 0.0))
-            scene = Scene.of(options.scene) if options.scene and number == 0 else None
+            scene = surroundings if number == 0 else None
             title = model.arm.robot.name if tabs is None else f"{number + 1}: {model.arm.robot.name}"
             tab = readouts.add_tab(title)
             with contextlib.ExitStack() as stack:

@@ -115,6 +115,7 @@ class Wizard:
         self._changed = threading.Condition()
         self._step = WizardStep()
         self._answer: bool | None = None
+        self._is_given_up = False
         self._save: Callable[[str, str], object] | None = None
 
     @property
@@ -142,6 +143,7 @@ class Wizard:
                     "a measurement runs", parameter="kind", hint="finish it, or give it up first"
                 )
             self._step, self._answer, self._save = WizardStep(kind, is_running=True), None, None
+            self._is_given_up = False
         threading.Thread(target=self._run, args=(work,), name="heptarm-panel-wizard", daemon=True).start()
 
     def go_on(self) -> None:
@@ -149,14 +151,27 @@ class Wizard:
         self._reply(answer=True)
 
     def give_up(self) -> None:
-        """End the measurement; an arm that moves stops on its path."""
-        if self._step.is_running and not self._step.asks:
+        """End the measurement; an arm that moves stops on its path.
+
+        Raises:
+            CommandRejected: none runs.
+        """
+        if not self._step.is_running:
+            raise CommandRejected("no measurement runs", parameter="answer", hint="begin one")
+        asks = self._step.asks
+        self.end()
+        if not asks:
             self._arm.stop()
-            return
-        self._reply(answer=False)
+
+    def end(self) -> None:
+        """End the measurement before its next motion; what moves now is stopped by whoever calls this."""
+        with self._changed:
+            if self._step.is_running:
+                self._is_given_up, self._answer = True, False
+                self._changed.notify_all()
 
     def close(self) -> None:
-        """Give up what waits for an answer."""
+        """Give up what runs."""
         with contextlib.suppress(HeptarmError):
             if self._step.is_running:
                 self.give_up()
@@ -195,12 +210,25 @@ class Wizard:
         if isinstance(what, (calibration.LoadPlan, calibration.TouchPlan, calibration.HandEyePlan)):
             self._show(self._arm.plan(list(what.motions), speed=what.speed, step=0.05).outline())
         with self._changed:
+            self._check()
             self._step, self._answer = replace(self._step, asks=str(what)), None
             self._changed.wait_for(lambda: self._answer is not None)
             self._step = replace(self._step, asks="")
             return bool(self._answer)
 
+    def _check(self) -> None:
+        """Called between motions: the arm rests, so that a stop there ends no motion.
+
+        Raises:
+            CommandRejected: the measurement was given up.
+        """
+        if self._is_given_up:
+            raise CommandRejected(
+                "the measurement was given up, nothing moves any more", hint="begin it again"
+            )
+
     def _advance(self, done: int, count: int) -> None:
+        self._check()
         self._put(done=done, count=count)
 
     def _run(self, work: Callable[[], Any]) -> None:
@@ -280,6 +308,7 @@ class Wizard:
 
     def _see(self, pixels: npt.NDArray[np.uint8], sighting: calibration.Sighting | None) -> None:
         """Show a picture with the corners that were found in it."""
+        self._check()
         shown = np.array(pixels if pixels.ndim == 3 else np.repeat(pixels[:, :, None], 3, axis=2))
         for u, v in () if sighting is None else np.rint(sighting.pixels).astype(int):
             shown[max(v - _MARK, 0) : v + _MARK + 1, max(u - _MARK, 0) : u + _MARK + 1] = (255, 107, 10)

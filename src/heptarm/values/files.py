@@ -188,6 +188,25 @@ def make_folder(folder: Path, *, name: str = "path") -> Path:
     return folder
 
 
+def writable_file(path: Path, *, overwrite: bool, name: str = "path") -> Path:
+    """Refuse, before anything moves, a file that could not be written at the end; its folder is made.
+
+    Raises:
+        CommandRejected: it exists and is not to be replaced, or it cannot be written.
+    """
+    refuse_existing(path, overwrite=overwrite, name=name)
+    make_folder(path.parent, name=name)
+    is_new = not os.path.lexists(path)
+    if is_new or path.is_file() or path.is_dir():  # a device, such as /dev/stdout, is left alone
+        try:
+            path.open("ab").close()
+        except OSError as error:
+            raise unwritable(path, error, name=name) from error
+    if is_new:
+        path.unlink()
+    return path
+
+
 def read_arrays(path: Path, what: str, *, hint: str = "") -> dict[str, npt.NDArray[Any]]:
     """The arrays of a .npz file by name; numbers and texts only, no code.
 

@@ -111,14 +111,15 @@ class LiveView(Sealed):
 
         recording = rerun.RecordingStream("heptarm")
         outputs: list[Any] = []
-        if self._file is not None:
-            _check_writable(self._file)
-            outputs.append(rerun.FileSink(str(self._file)))
         if self._to:
             _check_viewer(self._to)
             outputs.append(rerun.GrpcSink(self._to))
         if self._spawn:
             _check_display()
+        if self._file is not None:  # after what may be refused: it is created, or emptied
+            _check_writable(self._file)
+            outputs.append(rerun.FileSink(str(self._file)))
+        if self._spawn:
             rerun.spawn(port=_PORT, connect=False, hide_welcome_screen=True)
             outputs.append(rerun.GrpcSink(f"rerun+http://127.0.0.1:{_PORT}/proxy"))
         recording.set_sinks(*outputs, default_blueprint=blueprint(tuple(self._arms)))

@@ -19,7 +19,7 @@ from heptarm.cli.output import emit
 from heptarm.errors import CommandRejected, HeptarmError
 from heptarm.rl.pool import Job, JobResult, run_jobs
 from heptarm.rl.sweep import sweep
-from heptarm.values.files import make_folder, refuse_existing, unwritable
+from heptarm.values.files import unwritable, writable_file
 
 JOBS = Group("Many at once")
 Seeds = Annotated[
@@ -131,14 +131,12 @@ class JobOptions:
 
 
 def table_at(out: Path, *, overwrite: bool) -> Path:
-    """The file of a table, in a folder that is there, before anything runs.
+    """The file of a table, which can be written, before anything runs.
 
     Raises:
-        CommandRejected: it exists, or the folder cannot be made.
+        CommandRejected: it exists, or cannot be written.
     """
-    table = refuse_existing(out.with_suffix(".csv"), overwrite=overwrite, name="out")
-    make_folder(table.parent, name="out")
-    return table
+    return writable_file(out.with_suffix(".csv"), overwrite=overwrite, name="out")
 
 
 #: Nothing was given on the command line.

@@ -7,15 +7,14 @@ from pathlib import Path
 
 from heptarm.cli.output import emit
 from heptarm.rl.report import EpisodeReport
-from heptarm.values.files import make_folder, refuse_existing
+from heptarm.values.files import writable_file
 
 
 def refuse_reports(out: Path | None, *, overwrite: bool, film: bool) -> None:
     """Refuse, before anything runs, a name under which there is a report or cannot be one."""
     if out is not None:
         for suffix in (".npz", ".json", ".png", *([".gif"] if film else [])):
-            refuse_existing(out.with_suffix(suffix), overwrite=overwrite, name="out")
-        make_folder(out.parent, name="out")
+            writable_file(out.with_suffix(suffix), overwrite=overwrite, name="out")
 
 
 def write_report(
