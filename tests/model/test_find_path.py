@@ -13,7 +13,7 @@ from heptarm import model, planning, shapes
 from heptarm.planning.constraints import constraint_from_text
 from heptarm.values.checks import Array
 from heptarm.values.pose import Pose, deg
-from heptarm.values.robot import robot
+from heptarm.values.robot import Body, robot
 
 IIWA = robot("iiwa14")
 LEFT, RIGHT = deg(-40, 50, 0, -80, 0, 50, 0), deg(40, 50, 0, -80, 0, 50, 0)
@@ -91,6 +91,20 @@ def test_a_path_to_the_pose_of_the_arm_moves_no_joint(degrees: tuple[float, ...]
 def test_a_slower_path_takes_longer(wall: ha.CollisionModel) -> None:
     fast, slow = (planning.find_path(wall, start=LEFT, goal=RIGHT, speed=speed) for speed in (1.0, 0.2))
     assert slow.duration > 2.0 * fast.duration
+
+
+@pytest.mark.parametrize("load", [None, Body(14.0, np.array((0.0, 0.0, 0.1)))], ids=["bare", "14 kg"])
+def test_a_path_searched_for_a_low_speed_keeps_its_limits_at_full_speed(
+    wall: ha.CollisionModel, load: Body | None
+) -> None:
+    slow, fast = (
+        planning.find_path(wall, start=LEFT, goal=RIGHT, speed=speed, tcp_speed=0.25, load=load, timeout=60.0)
+        for speed in (0.05, 1.0)
+    )
+    assert slow.points == fast.points and slow.duration > 1.2 * fast.duration
+    limits = fast.dynamics.joint_speed, fast.dynamics.joint_acceleration
+    assert limits[0][0] < 0.5
+    np.testing.assert_array_equal((slow.dynamics.joint_speed, slow.dynamics.joint_acceleration), limits)
 
 
 def test_a_pose_is_reached_with_any_elbow(wall: ha.CollisionModel) -> None:
