@@ -48,7 +48,7 @@ class SpeedLimits:
     def time(self, robot: RobotModel, points: Array) -> tuple[float, Dynamics]:
         """Duration of a spline through points at the speed [s], and dynamics with which limits are kept at any speed.
 
-        The dynamics are those of full speed: whoever moves along the spline may choose another speed than this one.
+        The dynamics are those of full speed, since the arm may move along the spline at another speed than this one.
 
         Args:
             robot: the robot.
