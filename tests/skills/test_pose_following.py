@@ -5,9 +5,11 @@ from __future__ import annotations
 import json
 import socket
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from subprocess import DEVNULL, PIPE, STDOUT
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,8 +22,9 @@ from heptarm.arm.link.target import Target
 from heptarm.cli.jog import DEVICES
 from heptarm.cli.options import Access, CommandTarget
 from heptarm.devices.pose_stream import PoseInput, PoseStream
-from heptarm.errors import CommandRejected, LimitError, NotReady, ShapeError
+from heptarm.errors import CommandRejected, LimitError, NotReady, OutsideWorkspace, ShapeError
 from heptarm.model.kinematics import forward
+from heptarm.skills.pose_following import _Follower
 from heptarm.values.robot import robot
 from tests.cli.running import HEPTARM, Command, refused
 from tests.conftest import RunningCabinet
@@ -262,6 +265,42 @@ def test_the_command_follows_a_phone_with_a_tool_within_the_workspace(tmp_path: 
             assert one.pose().distance_to(one.pose("flange")) < 1e-6, "the tool is detached again"
     finally:
         cabinet.close()
+
+
+class Refusing:
+    """An arm and its servo motion that refuse targets beyond a wall at x = 0.6 m."""
+
+    groups = ()
+    start = None
+
+    def __init__(self) -> None:
+        self.x = 0.5
+
+    def pose(self, **_: object) -> ha.Pose:
+        return ha.Pose.at(self.x)
+
+    def set(self, pose: ha.Pose) -> ha.Pose:
+        if pose.x > 0.6 + 1e-9:
+            raise OutsideWorkspace("the target is outside")
+        self.x = pose.x
+        return pose
+
+
+def test_the_next_press_of_the_clutch_begins_where_the_wall_has_held_the_arm() -> None:
+    one: Any = Refusing()
+    device: Any = SimpleNamespace(roles=devices.Roles(dead_man="clutch"))
+    follower = _Follower(one, one, device, 1.0, False, ha.Pose.at(), "clutch", None)
+
+    def move(places: Iterable[float], *buttons: str) -> None:
+        for x in places:
+            follower.step(PoseInput(ha.Pose.at(x), frozenset(buttons)))
+
+    move([0.0])
+    move(np.linspace(0.0, 0.4, 21).tolist(), "clutch")
+    assert one.x == pytest.approx(0.6), "the hand is 0.3 m beyond the wall"
+    move(np.linspace(0.4, 0.1, 21).tolist())
+    move(np.linspace(0.1, 0.05, 6).tolist(), "clutch")
+    assert one.x == pytest.approx(0.55)
 
 
 class Opened:
