@@ -199,6 +199,28 @@ def test_a_board_is_found_in_its_own_picture(board: Board) -> None:
     assert board.find(np.ascontiguousarray(printed[:, ::-1])) is None, "a mirrored board is none"
 
 
+def test_one_row_of_corners_is_no_sighting() -> None:
+    side = 60
+    printed = np.pad(BOARD.picture(pixels=side), side, constant_values=255)
+    for rows, corners in ((1, 0), (2, 12)):  # rows of corners that the picture has
+        seen = np.full_like(printed, 255)
+        seen[: (rows + 2) * side] = printed[: (rows + 2) * side]
+        numbers, _ = BOARD._corners(seen)
+        assert len(numbers) == 6 * rows
+        found = BOARD.find(seen)
+        assert (0 if found is None else len(found)) == corners
+
+
+@pytest.mark.parametrize("chosen", [[0, 1, 2, 3], [0, 7, 14, 21], [0, 1, 6]])
+def test_a_view_whose_corners_do_not_determine_the_board_is_named(chosen: list[int]) -> None:
+    given = views()
+    seen = given[2].sighting
+    few = Sighting(seen.points[chosen], seen.pixels[chosen], seen.size)
+    given[2] = HandEyeView(given[2].flange, few)
+    with pytest.raises(CommandRejected, match=rf"the {len(few)} corners of views\[2\] do not determine"):
+        estimate_hand_eye(given, matrix=MATRIX)
+
+
 def test_a_board_is_printed_in_its_true_size(tmp_path: Path) -> None:
     from PIL import Image
 

@@ -337,7 +337,7 @@ def roughly_estimated(
     given = _checked(views, FEWEST_REFINED if is_refined else FEWEST)
     _check_turns([view.flange for view in given])
     lens = first_matrix(given) if matrix is None else intrinsic(matrix)
-    seen = [_board_pose(view.sighting, lens, rest) for view in given]
+    seen = [board_pose(view.sighting, lens, rest, name=f"views[{index}]") for index, view in enumerate(given)]
     camera = _closed_form(
         [view.flange if frame == "flange" else view.flange.inverse() for view in given], seen
     )
@@ -410,21 +410,37 @@ def first_matrix(views: Sequence[HandEyeView]) -> Array:
     return np.asarray(cv.calibrateCamera(points, pixels, size, None, None, flags=flags)[1], float)
 
 
-def board_pose(sighting: Sighting, matrix: Array, distortion: npt.ArrayLike = NO_DISTORTION) -> Pose:
+def board_pose(
+    sighting: Sighting, matrix: Array, distortion: npt.ArrayLike = NO_DISTORTION, *, name: str = "views[0]"
+) -> Pose:
     """Pose of a board in the camera, from one picture (perspective-n-point, by OpenCV).
 
+    Args:
+        sighting: corners in the picture.
+        matrix: intrinsic matrix, shape (3, 3) [pixels].
+        distortion: shape (5,).
+        name: of the view, for the error.
+
     Raises:
+        CommandRejected: the corners do not determine it, as on one line.
         MissingExtra: OpenCV is not installed.
     """
-    return _board_pose(sighting, matrix, np.asarray(distortion, float))
-
-
-def _board_pose(sighting: Sighting, matrix: Array, distortion: Array) -> Pose:
     cv: Any = require("cv2", extra="vision")
-    points, pixels = sighting.points.copy(), sighting.pixels.copy()
-    _, turn, shift = cv.solvePnP(points, pixels, matrix, distortion, flags=cv.SOLVEPNP_IPPE)
-    _, turn, shift = cv.solvePnP(points, pixels, matrix, distortion, turn, shift, True, cv.SOLVEPNP_ITERATIVE)
-    return Pose.from_rotvec(np.ravel(shift), np.ravel(turn))
+    points, pixels, lens = sighting.points.copy(), sighting.pixels.copy(), np.asarray(distortion, float)
+    try:
+        _, turn, shift = cv.solvePnP(points, pixels, matrix, lens, flags=cv.SOLVEPNP_IPPE)
+        _, turn, shift = cv.solvePnP(points, pixels, matrix, lens, turn, shift, True, cv.SOLVEPNP_ITERATIVE)
+        found = np.concatenate([np.ravel(shift), np.ravel(turn)])
+    except cv.error:  # too few corners
+        found = np.full(6, np.nan)
+    if not np.isfinite(found).all():
+        raise CommandRejected(
+            f"the {len(sighting)} corners of {name} do not determine where the board is, as on one line",
+            parameter=name,
+            value=len(sighting),
+            hint="leave this view out, or take it with more rows of the board in the picture",
+        )
+    return Pose.from_rotvec(found[:3], found[3:])
 
 
 def _closed_form(flanges: Sequence[Pose], boards: Sequence[Pose]) -> Pose:

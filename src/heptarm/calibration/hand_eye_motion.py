@@ -159,7 +159,7 @@ def hand_eye(
     seen.look()
     if not seen.views:
         raise CommandRejected(
-            f"the camera does not see the board from here: no corner of the {board} is found in its picture",
+            f"the camera does not see the board from here: too few corners of the {board} are found in its picture",
             parameter="board",
             hint="move the arm until the whole board is in the picture, in focus and bright, with the right side up; "
             "check columns, rows and kind",
