@@ -130,6 +130,12 @@ def test_one_of_several_goals_is_reached(wall: ha.CollisionModel) -> None:
     assert (both.end == RIGHT).all()
 
 
+@pytest.mark.parametrize("kind", [np.float32, np.float64, np.int64])
+def test_a_goal_may_be_a_list_of_numbers_of_numpy(wall: ha.CollisionModel, kind: Any) -> None:
+    path = planning.find_path(wall, start=np.round(LEFT), goal=[kind(value) for value in np.round(LEFT)])
+    assert (path.end == np.round(LEFT)).all()
+
+
 def test_a_region_leaves_a_choice(wall: ha.CollisionModel) -> None:
     middle = Pose.of((0.5, 0.3, 0.35), DOWN)
     region = ha.Region.of(middle, box=(0.1, 0.2, 0.1), cone=0.3, turn=3.0)
@@ -411,6 +417,8 @@ def test_a_goal_that_contradicts_the_constraint_is_refused(wall: ha.CollisionMod
         ({"start": deg(0, 150, 0, 0, 0, 0, 0)}, ha.LimitError, "A2 must be in"),
         ({"goal": "home"}, ha.ShapeError, "goal must be joint positions, a Pose, a Region"),
         ({"goal": []}, ha.ShapeError, "goal"),
+        ({"goal": np.empty((0, 7))}, ha.ShapeError, r"goal must have shape \(7,\), got \(0, 7\)"),
+        ({"goal": [np.empty((0, 7))]}, ha.ShapeError, r"goal must have shape \(7,\), got \(0, 7\)"),
         ({"goal": deg(0, 150, 0, 0, 0, 0, 0)}, ha.LimitError, "A2 must be in"),
         ({"keep": "z"}, ha.ShapeError, "keep must be Upright, OnPlane"),
         ({"keep": [ha.Upright(), None]}, ha.ShapeError, "keep must be Upright, OnPlane"),
