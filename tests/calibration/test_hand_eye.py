@@ -214,14 +214,17 @@ def test_one_row_of_corners_is_no_sighting() -> None:
         assert (0 if found is None else len(found)) == corners
 
 
+@pytest.mark.parametrize("matrix", [MATRIX, None], ids=["known", "unknown"])
 @pytest.mark.parametrize("chosen", [[0, 1, 2, 3], [0, 7, 14, 21], [0, 1, 6]])
-def test_a_view_whose_corners_do_not_determine_the_board_is_named(chosen: list[int]) -> None:
+def test_a_view_whose_corners_do_not_determine_the_board_is_named(
+    chosen: list[int], matrix: Array | None
+) -> None:
     given = views()
     seen = given[2].sighting
     few = Sighting(seen.points[chosen], seen.pixels[chosen], seen.size)
     given[2] = HandEyeView(given[2].flange, few)
     with pytest.raises(CommandRejected, match=rf"the {len(few)} corners of views\[2\] do not determine"):
-        estimate_hand_eye(given, matrix=MATRIX)
+        estimate_hand_eye(given, matrix=matrix)
 
 
 def test_a_board_is_printed_in_its_true_size(tmp_path: Path) -> None:
