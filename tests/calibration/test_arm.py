@@ -11,12 +11,12 @@ import pytest
 
 import heptarm as ha
 from heptarm import calibration
-from heptarm.calibration import ArmSamples, FittedArm, FittedNumbers
+from heptarm.calibration import ArmSamples, FittedArm, FittedNumbers, arm_fit
 from heptarm.calibration.load_estimate import load_regressor
 from heptarm.cli import calibrate
 from heptarm.cli.rl.policies import recipe_of
 from heptarm.errors import CommandRejected, LimitError, ShapeError
-from heptarm.model.dynamics import GRAVITY
+from heptarm.model.dynamics import GRAVITY, inverse_dynamics_rows
 from heptarm.rl.sim.randomisation import MILD, STRONG, Randomisation
 from heptarm.rl.task import ReachTask
 from heptarm.sim.plant.plant import Plant, fitted_arm
@@ -80,6 +80,40 @@ def test_it_predicts_another_recording_within_its_noise(fit: calibration.ArmFit)
     assert tried.is_good and (tried.ratio <= 1.2).all() and not tried.contradictions
     blind = calibration.validate(FittedArm("iiwa14"), other)
     assert not blind.is_good and "Nm off the prediction" in blind.contradictions[0]
+
+
+def test_an_arm_with_a_media_flange_is_validated_with_it(
+    along: Along, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    touch, file = robot("iiwa14+touch"), tmp_path / "my-arm.toml"
+    of = (*along[:4], inverse_dynamics_rows(touch, *along[1:4]))
+    samples = computed(drawn(1), of, seed=1)
+    fit = calibration.simulator(samples, robot=touch)
+    assert fit.validation.is_good and not fit.arm.contradictions
+    fit.save(file)
+    read = calibration.load_fitted(file)
+    assert read.robot == "iiwa14+touch" and calibration.validate(read, samples).is_good
+    assert fitted_arm(file, IIWA) is not None, "the simulator takes it with any flange"
+    # a recording names its robot: the flange is that of the recording, also with an arm that has another one
+    for named, is_good in (("iiwa14+touch", True), ("iiwa14", False), ("", True)):
+        monkeypatch.setattr(arm_fit, "samples_of", lambda *_, named=named: (samples, named))
+        assert calibration.validate(read, "run.mcap").is_good is is_good, named
+    monkeypatch.setattr(arm_fit, "samples_of", lambda *_: (samples, "iiwa14+touch"))
+    assert calibration.validate(replace(read, robot="iiwa14"), "run.mcap").is_good, "the file of an older fit"
+
+
+def test_a_recording_of_another_robot_validates_nothing(
+    fit: calibration.ArmFit, samples: ArmSamples, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    names = {"run": "iiwa14", "validation": "iiwa7"}
+    monkeypatch.setattr(arm_fit, "samples_of", lambda _, name: (samples, names[name]))
+    with pytest.raises(
+        CommandRejected, match="validation must be a recording of an iiwa14, got one of an iiwa7"
+    ):
+        calibration.simulator(samples, validation="other.mcap")
+    names["run"] = "med14"
+    with pytest.raises(CommandRejected, match="run must be a recording of an iiwa14, got one of an med14"):
+        calibration.validate(fit.arm, "other.mcap")
 
 
 def test_a_fitted_simulator_behaves_like_the_arm(fit: calibration.ArmFit, tmp_path: Path) -> None:

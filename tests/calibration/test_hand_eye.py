@@ -6,6 +6,7 @@ import json
 import math
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any, Literal
 
 import numpy as np
@@ -13,12 +14,14 @@ import pytest
 
 import heptarm as ha
 from heptarm import calibration, model
+from heptarm.arm.devices.camera import CameraStream
 from heptarm.calibration import Board, HandEyeView, Sighting, estimate_hand_eye
 from heptarm.calibration.hand_eye_estimate import HandEyeGuess, HandEyeModel
 from heptarm.cli.calibrate_eye import board, eye
 from heptarm.cli.options import Access, CommandTarget
 from heptarm.errors import CommandRejected, LimitError, ShapeError
 from heptarm.io.targets import SavedTarget, add_target, save_tool, saved_targets, targets_file
+from heptarm.values.checks import Array
 from heptarm.values.robot import robot
 from tests.drawing import cannot_draw
 from tests.long import longer
@@ -199,6 +202,31 @@ def test_a_board_is_found_in_its_own_picture(board: Board) -> None:
     assert board.find(np.ascontiguousarray(printed[:, ::-1])) is None, "a mirrored board is none"
 
 
+def test_one_row_of_corners_is_no_sighting() -> None:
+    side = 60
+    printed = np.pad(BOARD.picture(pixels=side), side, constant_values=255)
+    for rows, corners in ((1, 0), (2, 12)):  # rows of corners that the picture has
+        seen = np.full_like(printed, 255)
+        seen[: (rows + 2) * side] = printed[: (rows + 2) * side]
+        numbers, _ = BOARD._corners(seen)
+        assert len(numbers) == 6 * rows
+        found = BOARD.find(seen)
+        assert (0 if found is None else len(found)) == corners
+
+
+@pytest.mark.parametrize("matrix", [MATRIX, None], ids=["known", "unknown"])
+@pytest.mark.parametrize("chosen", [[0, 1, 2, 3], [0, 7, 14, 21], [0, 1, 6]])
+def test_a_view_whose_corners_do_not_determine_the_board_is_named(
+    chosen: list[int], matrix: Array | None
+) -> None:
+    given = views()
+    seen = given[2].sighting
+    few = Sighting(seen.points[chosen], seen.pixels[chosen], seen.size)
+    given[2] = HandEyeView(given[2].flange, few)
+    with pytest.raises(CommandRejected, match=rf"the {len(few)} corners of views\[2\] do not determine"):
+        estimate_hand_eye(given, matrix=matrix)
+
+
 def test_a_board_is_printed_in_its_true_size(tmp_path: Path) -> None:
     from PIL import Image
 
@@ -281,6 +309,65 @@ def scene(folder: Path, camera: ha.Camera, board: Board, frame: Frame) -> str:
     seen = ha.Pose.at(0, 0, 0.33) @ turned(0.0, 0.0, 0.3) @ ha.Pose.at(*-board.centre)
     at = flange @ camera.pose @ seen if frame == "flange" else flange.inverse() @ camera.pose @ seen
     return str(board.save_scene(folder / "board.xml", at=at, on_flange=frame == "base"))
+
+
+class Ideal(Board):
+    """A board whose corners are found without pictures: what is given as a picture is the pose of the flange."""
+
+    place = (
+        ha.Pose.from_matrix(model.forward(robot("iiwa14"), HOME))
+        @ CAMERA
+        @ ha.Pose.at(0, 0, 0.33)
+        @ turned(0.0, 0.0, 0.3)
+        @ ha.Pose.at(*-BOARD.centre)
+    )
+
+    def find(self, picture: Any) -> Sighting | None:
+        guess = HandEyeGuess(
+            CAMERA, self.place, np.array([*MATRIX[[0, 1, 0, 1], [0, 1, 2, 2]], *FLAT[:4]]), 0.0
+        )
+        return Sighting(
+            self.points, HandEyeModel([picture], [self.points], "flange").seen(guess)[0], (640, 480)
+        )
+
+
+class Stream(CameraStream):
+    """The flange of an arm that moves at once, as pictures."""
+
+    matrix = MATRIX
+    distortion = FLAT
+    frame = "flange"
+
+    def __init__(self) -> None:
+        self._q: Array = HOME
+
+    @property
+    def here(self) -> Array:
+        return self._q
+
+    def read(self, **_: Any) -> Any:
+        flange = ha.Pose.from_matrix(model.forward(robot("iiwa14"), self._q))
+        return SimpleNamespace(pixels=flange, flange=flange)
+
+    def move(self, motion: Any, **_: Any) -> None:
+        self._q = motion.q
+
+
+@pytest.mark.parametrize("count", [7, 9])
+def test_as_many_views_are_taken_as_were_asked_for(count: int) -> None:
+    stream, plans = Stream(), []
+    arm: Any = SimpleNamespace(
+        robot=robot("iiwa14"),
+        speed=1.0,
+        wait_for_rest=lambda: SimpleNamespace(q_cmd=stream.here, stamp=0),
+        plan=lambda *_, **__: SimpleNamespace(collisions=()),
+        move=stream.move,
+    )
+    found = calibration.hand_eye(
+        arm, stream, Ideal(), views=count, confirm=lambda plan: bool(plans.append(plan.purpose)) or True
+    )
+    assert len(found.residuals) == count and np.abs(errors(found, CAMERA)).max() < 1e-5
+    assert len(plans) == (1 if count == 7 else 2)
 
 
 @pytest.mark.long

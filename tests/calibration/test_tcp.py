@@ -94,6 +94,9 @@ def test_orientation_from_a_tool_that_is_aligned_with_the_world() -> None:
         inside += found.pose.angle_to(TIP) <= 2.0 * found.sigma_angle
         assert found.pose.angle_to(TIP) < math.radians(0.3)
     assert inside >= 90
+    with pytest.raises(ShapeError, match="aligned must be a sequence of poses, got Pose"):
+        calibration.tcp(about(POINT, TILTS), aligned=aligned[0], world=world)  # type: ignore[arg-type]
+    assert calibration.tcp(about(POINT, TILTS), aligned=None).pose.quat[3] == 1.0
     once = calibration.tcp(about(POINT, TILTS), aligned=aligned[:1], world=world)
     assert math.isnan(once.sigma_angle) and "not estimated from residuals" in str(once)
 

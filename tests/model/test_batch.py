@@ -7,7 +7,8 @@ import pytest
 
 from heptarm import model
 from heptarm.errors import LimitError, ShapeError, Unreachable
-from heptarm.values.pose import deg
+from heptarm.values.checks import Array
+from heptarm.values.pose import Pose, deg
 from heptarm.values.robot import RobotModel
 from tests.model.arms import MODELS, random_q
 
@@ -112,6 +113,24 @@ def test_none_at_all(robot: RobotModel) -> None:
     assert model.forward_batch(robot, nothing).shape == (0, 4, 4)
     assert model.jacobian_batch(robot, nothing).shape == (0, 6, 7)
     assert model.solve_batch(robot, np.zeros((0, 4, 4)), e1=0.0, status=2).shape == (0, 7)
+
+
+@pytest.mark.parametrize(
+    "turn",
+    [np.diag([1.0, 1.0, -1.0]), np.zeros((3, 3)), 1.1 * np.eye(3), 1e200 * np.eye(3), np.eye(3)[[1, 0, 2]]],
+    ids=["left-handed", "zero", "scaled", "huge", "exchanged"],
+)
+def test_matrices_without_a_rotation_are_refused_as_poses_refuse_them(robot: RobotModel, turn: Array) -> None:
+    words = "must be orthonormal and right-handed, got"
+    poses = model.forward_batch(robot, np.full((3, 7), 0.3))
+    poses[1, :3, :3] = turn
+    with pytest.raises(ShapeError, match=rf"the rotation of poses\[1\] {words}"):
+        model.solve_batch(robot, poses)
+    for call in (model.solve, model.solve_all, lambda arm, pose: model.intervals(arm, pose, 2)):
+        with pytest.raises(ShapeError, match=f"the rotation of pose {words}"):
+            call(robot, poses[1])
+    with pytest.raises(ShapeError, match=f"the rotation of matrix {words}"):
+        Pose.from_matrix(poses[1])
 
 
 def test_refuses(robot: RobotModel) -> None:

@@ -13,7 +13,7 @@ from heptarm import model, planning, shapes
 from heptarm.planning.constraints import constraint_from_text
 from heptarm.values.checks import Array
 from heptarm.values.pose import Pose, deg
-from heptarm.values.robot import robot
+from heptarm.values.robot import Body, robot
 
 IIWA = robot("iiwa14")
 LEFT, RIGHT = deg(-40, 50, 0, -80, 0, 50, 0), deg(40, 50, 0, -80, 0, 50, 0)
@@ -93,6 +93,20 @@ def test_a_slower_path_takes_longer(wall: ha.CollisionModel) -> None:
     assert slow.duration > 2.0 * fast.duration
 
 
+@pytest.mark.parametrize("load", [None, Body(14.0, np.array((0.0, 0.0, 0.1)))], ids=["bare", "14 kg"])
+def test_a_path_searched_for_a_low_speed_keeps_its_limits_at_full_speed(
+    wall: ha.CollisionModel, load: Body | None
+) -> None:
+    slow, fast = (
+        planning.find_path(wall, start=LEFT, goal=RIGHT, speed=speed, tcp_speed=0.25, load=load, timeout=60.0)
+        for speed in (0.05, 1.0)
+    )
+    assert slow.points == fast.points and slow.duration > 1.2 * fast.duration
+    limits = fast.dynamics.joint_speed, fast.dynamics.joint_acceleration
+    assert limits[0][0] < 0.5
+    np.testing.assert_array_equal((slow.dynamics.joint_speed, slow.dynamics.joint_acceleration), limits)
+
+
 def test_a_pose_is_reached_with_any_elbow(wall: ha.CollisionModel) -> None:
     goal, tcp = Pose.of((0.55, 0.3, 0.3), DOWN), Pose.at(0.0, 0.05, 0.1)
     path = planning.find_path(wall, start=LEFT, goal=goal, tcp=tcp, timeout=60.0)
@@ -114,6 +128,12 @@ def test_one_of_several_goals_is_reached(wall: ha.CollisionModel) -> None:
     assert np.linalg.norm(tool_at(path.end, Pose.at()).xyz - near.xyz) < 1e-6
     both = planning.find_path(wall, start=LEFT, goal=np.array([RIGHT, RIGHT]), timeout=60.0)
     assert (both.end == RIGHT).all()
+
+
+@pytest.mark.parametrize("kind", [np.float32, np.float64, np.int64])
+def test_a_goal_may_be_a_list_of_numbers_of_numpy(wall: ha.CollisionModel, kind: Any) -> None:
+    path = planning.find_path(wall, start=np.round(LEFT), goal=[kind(value) for value in np.round(LEFT)])
+    assert (path.end == np.round(LEFT)).all()
 
 
 def test_a_region_leaves_a_choice(wall: ha.CollisionModel) -> None:
@@ -397,6 +417,8 @@ def test_a_goal_that_contradicts_the_constraint_is_refused(wall: ha.CollisionMod
         ({"start": deg(0, 150, 0, 0, 0, 0, 0)}, ha.LimitError, "A2 must be in"),
         ({"goal": "home"}, ha.ShapeError, "goal must be joint positions, a Pose, a Region"),
         ({"goal": []}, ha.ShapeError, "goal"),
+        ({"goal": np.empty((0, 7))}, ha.ShapeError, r"goal must have shape \(7,\), got \(0, 7\)"),
+        ({"goal": [np.empty((0, 7))]}, ha.ShapeError, r"goal must have shape \(7,\), got \(0, 7\)"),
         ({"goal": deg(0, 150, 0, 0, 0, 0, 0)}, ha.LimitError, "A2 must be in"),
         ({"keep": "z"}, ha.ShapeError, "keep must be Upright, OnPlane"),
         ({"keep": [ha.Upright(), None]}, ha.ShapeError, "keep must be Upright, OnPlane"),

@@ -6,6 +6,7 @@ import io
 import json
 import os
 import random
+import re
 import warnings
 import zipfile
 from collections.abc import Callable
@@ -392,6 +393,38 @@ def test_eight_columns_begin_with_the_time_and_of_more_the_named_ones_count(tmp_
     rows = [",".join([f"{0.5 * i:g}", *["9"] * 7, *[f"{0.1 * i:g}"] * 7]) for i in range(3)]
     found = Trajectory.load(table(tmp_path, names, *rows))
     assert found.duration == 1.0 and found.q[1].tolist() == [0.1] * 7
+
+
+@pytest.mark.parametrize(
+    "name", ["Time (s)", "time_s", "t [s]", "sec", "Seconds", "timestamp_sec", "time[seconds]", "t_s"]
+)
+@pytest.mark.parametrize("joints", [[f"q{i}" for i in range(1, 8)], list("abcdefg")], ids=["named", "others"])
+def test_a_column_of_seconds_has_many_names(tmp_path: Path, name: str, joints: list[str]) -> None:
+    rows = [",".join([f"{0.05 * i:g}", *[f"{0.1 * i:g}"] * 7]) for i in range(3)]
+    for rate in (None, 10.0):
+        found = Trajectory.load(table(tmp_path, ",".join([name, *joints]), *rows), rate=rate)
+        assert found.times.tolist() == pytest.approx([0.0, 0.05, 0.1])
+
+
+@pytest.mark.parametrize(
+    "name", ["time [ms]", "time_ns", "timestamp_ns", "stamp", "t_ms", "msec", "milliseconds", "ms", "elapsed"]
+)
+@pytest.mark.parametrize("joints", [[f"q{i}" for i in range(1, 8)], list("abcdefg")], ids=["named", "others"])
+def test_times_that_may_not_be_seconds_need_a_rate(tmp_path: Path, name: str, joints: list[str]) -> None:
+    rows = [",".join([f"{50 * i}", *[f"{0.1 * i:g}"] * 7]) for i in range(3)]
+    file = table(tmp_path, ",".join([name, *joints]), *rows)
+    with pytest.raises(
+        CommandRejected, match=rf"its column '{re.escape(name)}' seems to have times .*give rate"
+    ):
+        Trajectory.load(file)
+    found = Trajectory.load(file, rate=20.0)
+    assert found.times.tolist() == pytest.approx([0.0, 0.05, 0.1]) and found.q[1].tolist() == [0.1] * 7
+
+
+def test_columns_that_begin_with_t_are_no_times(tmp_path: Path) -> None:
+    rows = [",".join([f"{0.1 * i:g}"] * 10) for i in range(3)]
+    names = ",".join(["tau.A1", "second_arm", "t1", *(f"q{i}" for i in range(1, 8))])
+    assert Trajectory.load(table(tmp_path, names, *rows)).duration == pytest.approx(0.02)
 
 
 def test_a_table_that_heptarm_has_converted_is_a_trajectory(tmp_path: Path) -> None:

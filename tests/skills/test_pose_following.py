@@ -5,20 +5,26 @@ from __future__ import annotations
 import json
 import socket
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from subprocess import DEVNULL, PIPE, STDOUT
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 
 import heptarm as ha
+import heptarm.cli.teleop as command_module
 from heptarm import devices, skills
 from heptarm.arm.link.local_simulator import PrivateCabinet
 from heptarm.arm.link.target import Target
+from heptarm.cli.jog import DEVICES
+from heptarm.cli.options import Access, CommandTarget
 from heptarm.devices.pose_stream import PoseInput, PoseStream
-from heptarm.errors import CommandRejected, LimitError, NotReady, ShapeError
+from heptarm.errors import CommandRejected, LimitError, NotReady, OutsideWorkspace, ShapeError
 from heptarm.model.kinematics import forward
+from heptarm.skills.pose_following import _Follower
 from heptarm.values.robot import robot
 from tests.cli.running import HEPTARM, Command, refused
 from tests.conftest import RunningCabinet
@@ -261,6 +267,74 @@ def test_the_command_follows_a_phone_with_a_tool_within_the_workspace(tmp_path: 
         cabinet.close()
 
 
+class Refusing:
+    """An arm and its servo motion that refuse targets beyond a wall at x = 0.6 m."""
+
+    groups = ()
+    start = None
+
+    def __init__(self) -> None:
+        self.x = 0.5
+
+    def pose(self, **_: object) -> ha.Pose:
+        return ha.Pose.at(self.x)
+
+    def set(self, pose: ha.Pose) -> ha.Pose:
+        if pose.x > 0.6 + 1e-9:
+            raise OutsideWorkspace("the target is outside")
+        self.x = pose.x
+        return pose
+
+
+def test_the_next_press_of_the_clutch_begins_where_the_wall_has_held_the_arm() -> None:
+    one: Any = Refusing()
+    device: Any = SimpleNamespace(roles=devices.Roles(dead_man="clutch"))
+    follower = _Follower(one, one, device, 1.0, False, ha.Pose.at(), "clutch", None)
+
+    def move(places: Iterable[float], *buttons: str) -> None:
+        for x in places:
+            follower.step(PoseInput(ha.Pose.at(x), frozenset(buttons)))
+
+    move([0.0])
+    move(np.linspace(0.0, 0.4, 21).tolist(), "clutch")
+    assert one.x == pytest.approx(0.6), "the hand is 0.3 m beyond the wall"
+    move(np.linspace(0.4, 0.1, 21).tolist())
+    move(np.linspace(0.1, 0.05, 6).tolist(), "clutch")
+    assert one.x == pytest.approx(0.55)
+
+
+class Opened:
+    """A device, and an arm, that do nothing."""
+
+    robot = robot("iiwa14")
+
+    def __enter__(self) -> Opened:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        pass
+
+    def close(self) -> None:
+        pass
+
+
+@pytest.mark.parametrize(("given", "used"), [(None, 0.5), (0.05, 0.05)])
+def test_the_command_moves_by_a_device_at_the_speed_that_is_given(
+    monkeypatch: pytest.MonkeyPatch, given: float | None, used: float
+) -> None:
+    speeds = []
+
+    def moved(*_: object, **keywords: object) -> None:
+        speeds.append(keywords["speed"])
+
+    monkeypatch.setattr(command_module, "teleoperate", moved)
+    monkeypatch.setitem(DEVICES, "gamepad", Opened)
+    monkeypatch.setattr(CommandTarget, "connect", lambda _: Opened())
+    monkeypatch.setattr(Access, "ask_first", lambda *_: None)
+    assert command_module.teleop(device="gamepad", speed=given) == 0
+    assert speeds == [used]
+
+
 def test_the_command_refuses_what_does_not_fit() -> None:
     cases: list[tuple[tuple[str, ...], str]] = [
         ((), "one of --leader, --device and --poses, got none"),
@@ -268,6 +342,10 @@ def test_the_command_refuses_what_does_not_fit() -> None:
         (("--poses", "0", "--reflect", "0.5"), "reflect needs a leader"),
         (("--poses", "0", "--gripper", "scene", "--grip", "A"), "grip needs a leader and a gripper"),
         (("--leader", "a", "--gripper", "scene"), "gripper needs grip"),
+        (("--device", "gamepad", "--speed", "0.05", "--scale", "0.1"), "scale needs a leader or poses"),
+        (("--device", "gamepad", "--clutch", "A"), "clutch needs a leader"),
+        (("--poses", "0", "--clutch", "A"), "clutch needs a leader"),
+        (("--leader", "a", "--host", "0.0.0.0"), "host needs poses"),
         (("--poses", "0", "--gripper", "opens=A"), "signals of a gripper must be NAME=Group.Signal"),
         (("--poses", "0", "--workspace", "1,2"), "workspace must be X,Y,Z,X,Y,Z"),
         (("--poses", "0", "--for", "-1"), "for must be"),

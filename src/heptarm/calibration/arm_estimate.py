@@ -128,7 +128,7 @@ def estimate_arm(samples: ArmSamples, model: RobotModel, *, acceleration: npt.Ar
         design = design.some(~touched)
         found = _solved(design, model)
     numbers, remarks = _numbers(design, found, samples, delay)
-    return Estimate(FittedArm(model.base_name, tuple(numbers), tuple(contradictions)), tuple(remarks))
+    return Estimate(FittedArm(model.name, tuple(numbers), tuple(contradictions)), tuple(remarks))
 
 
 def _rough_delay(windows: Windows) -> float:

@@ -135,8 +135,8 @@ def simulator(
     Args:
         run: what was recorded: samples, a recording, or the name of its file.
         robot: the robot; None: that of the recording.
-        validation: another recording, of other motions, that the result has to predict; None: it is the same one, which
-            proves less.
+        validation: another recording, of other motions, that the result has to predict; its flange may be another one.
+            None: it is the same one, which proves less.
         fri: another recording, of FRI sessions whose client moves the arm, for the delay of FRI commands; None: those
             of `run`, if it has any.
         declared: load data that the cabinet used meanwhile; None: none.
@@ -145,7 +145,7 @@ def simulator(
 
     Raises:
         CommandRejected: a recording cannot be used: an axis hardly moves, it lacks torques, it is too slow, something
-            touches the arm all the time, or its robot is unknown.
+            touches the arm all the time, or its robot is unknown; or `validation` is of another robot.
         ShapeError: a wrong shape.
     """
     run = run if isinstance(run, ArmSamples) else _recording(run, "run")
@@ -163,8 +163,12 @@ def simulator(
         remarks += ("delay of FRI commands: no FRI session is recorded whose client moves the arm",)
     else:
         arm = arm.with_numbers([late.numbers])
-    other = samples if validation is None else samples_of(validation, "validation")[0]
-    tried = validate(arm, other, declared=declared, acceleration=fall)
+    other = samples
+    if validation is not None:
+        other, named = samples_of(validation, "validation")
+        recorded = _recorded_model(model, named, "validation")
+        model = recorded if robot is None else model
+    tried = _predicted(arm, other, model, declared=declared, acceleration=fall)
     contradictions = (*arm.contradictions, *tried.contradictions, *(late.contradictions if late else ()))
     if commissioning is not None:
         contradictions += _differences(path_of(commissioning, "commissioning"))
@@ -208,15 +212,49 @@ def validate(
 
     Args:
         arm: the fitted arm.
-        run: a recording, best of motions that the arm was not identified from.
+        run: a recording, best of motions that the arm was not identified from; the flange is that of its robot, and of
+            samples that of the fitted arm.
         declared: load data that the cabinet used meanwhile; None: none.
         acceleration: of gravity in the base frame, shape (3,) [m/s²].
 
     Raises:
-        CommandRejected: the recording cannot be used.
+        CommandRejected: the recording cannot be used, or is of another robot.
     """
     model = instance(arm, FittedArm, "arm").model
-    samples, _ = samples_of(run, "run")
+    samples, named = samples_of(run, "run")
+    model = _recorded_model(model, named, "run")
+    return _predicted(arm, samples, model, declared=declared, acceleration=acceleration)
+
+
+def _recorded_model(model: RobotModel, named: str, name: str) -> RobotModel:
+    """The robot that a recording names, with its flange; the model where it names none that is known.
+
+    Raises:
+        CommandRejected: it is another robot than the model.
+    """
+    found = known_robot(named) if named else None
+    if found is None:
+        return model
+    if found.base_name != model.base_name:
+        raise CommandRejected(
+            f"{name} must be a recording of an {model.base_name}, got one of an {found.name}",
+            parameter=name,
+            value=found.name,
+            allowed=model.base_name,
+            hint="record the robot whose numbers these are",
+        )
+    return found
+
+
+def _predicted(
+    arm: FittedArm,
+    samples: ArmSamples,
+    model: RobotModel,
+    *,
+    declared: Body | None,
+    acceleration: npt.ArrayLike,
+) -> Validation:
+    """How well a fitted arm predicts samples of a robot with its flange."""
     delay, fall = float(arm.value("state_delay", 0.0)[0]), array(acceleration, 3, "acceleration")
     windows = aligned_windows(samples, model, delay=delay, acceleration=fall).thinned(_MOST)
     used = None if declared is None else instance(declared, Body, "declared")

@@ -30,8 +30,9 @@ _FRACTION = {"charuco": 0.74, "apriltag": 0.75}
 _TAG_ORIGIN = 0.5
 #: A square of so many pixels, or of a multiple, has its tag in the middle, and the tag whole modules.
 _TAG_PIXELS = 8
-#: Fewest corners that are a sighting.
-FEWEST_CORNERS = 4
+#: Fewest corners that are a sighting; and how far they have to be from one line, by the side of a square: the root of
+#: the sum of their squared distances from it.
+FEWEST_CORNERS, _FROM_LINE = 4, 0.5
 #: Thickness of the plate in a scene, and height of the print above it [m].
 _PLATE, _ABOVE = 0.004, 0.0002
 _SCENE = """<mujoco model="board">
@@ -259,7 +260,7 @@ class Board:
         return file
 
     def find(self, picture: npt.NDArray[np.uint8]) -> Sighting | None:
-        """Find it in a picture; None: it is not seen.
+        """Find it in a picture; None: it is not seen, or only corners on one line, which do not show how it is turned.
 
         Args:
             picture: bytes, shape (height, width) or (height, width, 3).
@@ -278,7 +279,10 @@ class Board:
         numbers, pixels = self._corners(np.ascontiguousarray(gray))
         if len(numbers) < FEWEST_CORNERS:
             return None
-        return Sighting(frozen(self.points[numbers]), frozen(pixels), (gray.shape[1], gray.shape[0]))
+        points = self.points[numbers]
+        if np.linalg.svd(points - points.mean(axis=0), compute_uv=False)[1] < _FROM_LINE * self.square:
+            return None
+        return Sighting(frozen(points), frozen(pixels), (gray.shape[1], gray.shape[0]))
 
     def _corners(self, gray: npt.NDArray[np.uint8]) -> tuple[npt.NDArray[np.int64], Array]:
         """Numbers of the corners that are found, shape (n,), and their pixels, shape (n, 2)."""

@@ -18,7 +18,7 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from heptarm.calibration.board import Sighting
+from heptarm.calibration.board import FEWEST_CORNERS, Sighting
 from heptarm.calibration.tip import student
 from heptarm.errors import CommandRejected, ShapeError, require
 from heptarm.io.targets import save_camera, saved_targets
@@ -33,6 +33,8 @@ FRAMES = ("flange", "base")
 FEWEST, FEWEST_REFINED = 4, 6
 #: Least angle by which the arm turns the camera about a second axis between views [rad].
 _TURNED = math.radians(4.0)
+#: Corners are on one line if they are this much narrower than long.
+_LINE = 1e-3
 #: Standard deviations above which the views do not determine the camera [m], [rad].
 _LOST, _LOST_ANGLE = 0.01, math.radians(1.0)
 #: Distances in a picture from which on a corner counts less at first [pixels].
@@ -337,7 +339,7 @@ def roughly_estimated(
     given = _checked(views, FEWEST_REFINED if is_refined else FEWEST)
     _check_turns([view.flange for view in given])
     lens = first_matrix(given) if matrix is None else intrinsic(matrix)
-    seen = [_board_pose(view.sighting, lens, rest) for view in given]
+    seen = [board_pose(view.sighting, lens, rest, name=f"views[{index}]") for index, view in enumerate(given)]
     camera = _closed_form(
         [view.flange if frame == "flange" else view.flange.inverse() for view in given], seen
     )
@@ -370,7 +372,25 @@ def _checked(views: Sequence[HandEyeView], fewest: int) -> list[HandEyeView]:
             value=len(views),
             hint="take pictures in which the board is seen from more directions",
         )
+    for index, view in enumerate(views):
+        if len(view.sighting) < FEWEST_CORNERS or _are_on_a_line(view.sighting.points):
+            raise _undetermined(view.sighting, f"views[{index}]")
     return list(views)
+
+
+def _are_on_a_line(points: Array) -> bool:
+    length, width, *_ = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
+    return bool(width <= _LINE * length)
+
+
+def _undetermined(sighting: Sighting, name: str) -> CommandRejected:
+    """The refusal of a view by its name."""
+    return CommandRejected(
+        f"the {len(sighting)} corners of {name} do not determine where the board is, as too few or on one line",
+        parameter=name,
+        value=len(sighting),
+        hint="leave this view out, or take it with more rows of the board in the picture",
+    )
 
 
 def _check_turns(flanges: Sequence[Pose]) -> None:
@@ -410,21 +430,29 @@ def first_matrix(views: Sequence[HandEyeView]) -> Array:
     return np.asarray(cv.calibrateCamera(points, pixels, size, None, None, flags=flags)[1], float)
 
 
-def board_pose(sighting: Sighting, matrix: Array, distortion: npt.ArrayLike = NO_DISTORTION) -> Pose:
+def board_pose(
+    sighting: Sighting, matrix: Array, distortion: npt.ArrayLike = NO_DISTORTION, *, name: str = "views[0]"
+) -> Pose:
     """Pose of a board in the camera, from one picture (perspective-n-point, by OpenCV).
 
+    Args:
+        sighting: corners in the picture.
+        matrix: intrinsic matrix, shape (3, 3) [pixels].
+        distortion: shape (5,).
+        name: of the view, for the error.
+
     Raises:
+        CommandRejected: the corners do not determine it, as on one line.
         MissingExtra: OpenCV is not installed.
     """
-    return _board_pose(sighting, matrix, np.asarray(distortion, float))
-
-
-def _board_pose(sighting: Sighting, matrix: Array, distortion: Array) -> Pose:
     cv: Any = require("cv2", extra="vision")
-    points, pixels = sighting.points.copy(), sighting.pixels.copy()
-    _, turn, shift = cv.solvePnP(points, pixels, matrix, distortion, flags=cv.SOLVEPNP_IPPE)
-    _, turn, shift = cv.solvePnP(points, pixels, matrix, distortion, turn, shift, True, cv.SOLVEPNP_ITERATIVE)
-    return Pose.from_rotvec(np.ravel(shift), np.ravel(turn))
+    points, pixels, lens = sighting.points.copy(), sighting.pixels.copy(), np.asarray(distortion, float)
+    _, turn, shift = cv.solvePnP(points, pixels, matrix, lens, flags=cv.SOLVEPNP_IPPE)
+    _, turn, shift = cv.solvePnP(points, pixels, matrix, lens, turn, shift, True, cv.SOLVEPNP_ITERATIVE)
+    found = np.concatenate([np.ravel(shift), np.ravel(turn)])
+    if not np.isfinite(found).all():
+        raise _undetermined(sighting, name)
+    return Pose.from_rotvec(found[:3], found[3:])
 
 
 def _closed_form(flanges: Sequence[Pose], boards: Sequence[Pose]) -> Pose:

@@ -159,7 +159,7 @@ def hand_eye(
     seen.look()
     if not seen.views:
         raise CommandRejected(
-            f"the camera does not see the board from here: no corner of the {board} is found in its picture",
+            f"the camera does not see the board from here: too few corners of the {board} are found in its picture",
             parameter="board",
             hint="move the arm until the whole board is in the picture, in focus and bright, with the right side up; "
             "check columns, rows and kind",
@@ -170,13 +170,14 @@ def hand_eye(
     mover.visit(
         "Look at the board from about here", list(_reached(arm.robot, turned, start)), start, seen.look
     )
-    rough_lens = first_matrix(seen.views) if known is None else intrinsic(known)
     lens = camera.distortion if distortion is None else distortion
     options = {"frame": camera.frame, "distortion": lens}
-    # a lens that is not known bends the few pictures so far; they show where to look from all the same
-    rough = roughly_estimated(seen.views, matrix=rough_lens, refine=False, **options)  # type: ignore[arg-type]
-    chosen = _chosen(arm.robot, seen.views, rough, board, start, wanted - len(seen.views))
-    mover.visit("Look at the board from all sides", chosen, start, seen.look)
+    if len(seen.views) < wanted:
+        rough_lens = first_matrix(seen.views) if known is None else intrinsic(known)
+        # a lens that is not known bends the few pictures so far; they show where to look from all the same
+        rough = roughly_estimated(seen.views, matrix=rough_lens, refine=False, **options)  # type: ignore[arg-type]
+        chosen = _chosen(arm.robot, seen.views, rough, board, start, wanted - len(seen.views))
+        mover.visit("Look at the board from all sides", chosen, start, seen.look)
     return estimate_hand_eye(seen.views, matrix=known, refine=refine, **options)  # type: ignore[arg-type]
 
 

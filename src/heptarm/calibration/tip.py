@@ -133,7 +133,7 @@ def tcp(
     poses: Sequence[Pose],
     *,
     along: Mapping[str, Pose] | None = None,
-    aligned: Sequence[Pose] = (),
+    aligned: Sequence[Pose] | None = (),
     world: Pose = POINTS_DOWN,
     tolerance: float = TOLERANCE,
 ) -> TcpEstimate:
@@ -146,7 +146,7 @@ def tcp(
         poses: four or more, with the tip at the fixed point.
         along: two more poses for the orientation, by an axis of the tool: in the first the fixed point touches that
             axis, in the second the half-plane between that axis and the second one. For example `{"z": p, "x": q}`.
-        aligned: instead of `along`: poses in which the tool's axes are those of `world`; their mean counts.
+        aligned: instead of `along`: poses in which the tool's axes are those of `world`; their mean counts. None: none.
         world: orientation of the tool in the base in the poses of `aligned`; points down unless you say otherwise.
         tolerance: the most by which a pose may miss the fixed point [m].
 
@@ -157,7 +157,8 @@ def tcp(
     """
     given = checked_poses(poses, "poses", FEWEST, "touch the same point with the flange tilted differently")
     allowed = within(tolerance, "tolerance", 0.0, 0.1, above=True, unit="m")
-    if along is not None and len(aligned):
+    parallel = checked_poses(() if aligned is None else aligned, "aligned")
+    if along is not None and parallel:
         raise CommandRejected(
             "along and aligned both give the orientation", parameter="along", hint="give one of them"
         )
@@ -166,14 +167,14 @@ def tcp(
     found = np.linalg.lstsq(matrix, -places.ravel(), rcond=None)[0]
     missed = (matrix @ found + places.ravel()).reshape(-1, 3)
     made = estimate_of(Pose.of(found[:3]), found[3:], matrix, missed, tolerance=allowed)
-    if along is None and not len(aligned):
+    if along is None and not parallel:
         return made
     if along is not None:
         freedom = 3 * len(given) - 6
         pointing = math.hypot(made.spread * student(freedom), *_sigma(matrix, made.spread))
         quat, sigma_angle = _along(along, found[:3], found[3:], pointing)
     else:
-        quat, sigma_angle = _aligned(checked_poses(aligned, "aligned"), world)
+        quat, sigma_angle = _aligned(parallel, world)
     return replace(made, pose=Pose.of(found[:3], quat), sigma_angle=sigma_angle)
 
 

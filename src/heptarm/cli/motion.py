@@ -263,8 +263,11 @@ def replay(
         Parameter(help="Factor on the recorded speed: 0.5 takes twice the time."),
     ] = 0.5,
     rate: Annotated[
-        float, Parameter(help="Rows per second of a table that has no column of times [Hz].")
-    ] = 100.0,
+        float | None,
+        Parameter(
+            help="Rows per second of a table without times in seconds [Hz]. Default: 100, without any times."
+        ),
+    ] = None,
     access: Access = _ACCESS,
 ) -> int:
     """Move to the start of a recorded trajectory and replay it.
@@ -290,7 +293,7 @@ def replay(
     return 0
 
 
-def _trajectory(file: Path, arm: str, rate: float) -> Trajectory:
+def _trajectory(file: Path, arm: str, rate: float | None) -> Trajectory:
     """The trajectory of a file that was taught or of a table, or that of a recording without its rests.
 
     Raises:

@@ -23,7 +23,7 @@ from heptarm.errors import CommandRejected
 from heptarm.record.episodes import Episode
 from heptarm.skills.gripper import TwoSignalGripper
 from heptarm.skills.pose_following import SPEED, LeaderArm, follow_poses
-from heptarm.skills.teleoperation import teleoperate
+from heptarm.skills.teleoperation import JOINT_SPEED, teleoperate
 from heptarm.values.camera import Camera
 from heptarm.values.checks import integer, within
 from heptarm.values.io import GripperWiring
@@ -31,6 +31,8 @@ from heptarm.values.text import counted
 from heptarm.values.workspace import Workspace
 
 _ACCESS = Access()
+#: Address at which poses are received, unless another one is given.
+_HOST = "127.0.0.1"
 
 
 def teleop(
@@ -53,12 +55,21 @@ def teleop(
         ),
     ] = None,
     host: Annotated[
-        str, Parameter(help="Address of this machine at which poses are received; 0.0.0.0: from everywhere.")
-    ] = "127.0.0.1",
-    scale: Annotated[float, Parameter(help="Movement of the follower per movement of the leader.")] = 1.0,
+        str | None,
+        Parameter(
+            help="Address of this machine at which poses are received; 0.0.0.0: from everywhere. Default: 127.0.0.1."
+        ),
+    ] = None,
+    scale: Annotated[
+        float | None, Parameter(help="Movement of the follower per movement of leader or hand. Default: 1.")
+    ] = None,
     speed: Annotated[
-        float, Parameter(help="Ceiling of the joints' speeds, a fraction of their maxima.")
-    ] = SPEED,
+        float | None,
+        Parameter(
+            help=f"Ceiling of the joints' speeds, a fraction of their maxima. Default: {SPEED:g}, of a device "
+            f"{JOINT_SPEED:g}."
+        ),
+    ] = None,
     clutch: Annotated[
         str,
         Parameter(help="Signal of the leader's IO that is held while the follower follows. Default: always."),
@@ -125,7 +136,8 @@ def teleop(
             f"there must be one of --leader, --device and --poses, got {', '.join(chosen) or 'none'}",
             parameter="leader",
         )
-    _check_options(leader, reflect=reflect, gripper=gripper, grip=grip)
+    _check_options(chosen[0], reflect=reflect, gripper=gripper, grip=grip)
+    _check_effect(chosen[0], scale=scale, clutch=clutch, host=host)
     wiring = GripperWiring.of(gripper) if gripper else None
     box = None if not workspace else _box(workspace)
     target = access.target if follower is None else replace(access.target, text=follower)
@@ -142,7 +154,7 @@ def teleop(
             opened = DEVICES[device]()
             stack.callback(opened.close)
         elif poses is not None:
-            guide = stream = stack.enter_context(pose_stream(poses, host=host))
+            guide = stream = stack.enter_context(pose_stream(poses, host=host or _HOST))
             _tell(f"waiting for poses at UDP port {stream.port}; hold clutch to move, quit ends", access)
         else:
             second = stack.enter_context(CommandTarget(text=leader).connect())
@@ -154,9 +166,22 @@ def teleop(
 
         def move(acts: Callable[[object], bool] | None = None) -> ServoStats:
             if device is not None:
-                return teleoperate(arm, opened, gripper=fingers, duration=limit, while_true=acts)
+                return teleoperate(
+                    arm,
+                    opened,
+                    gripper=fingers,
+                    speed=JOINT_SPEED if speed is None else speed,
+                    duration=limit,
+                    while_true=acts,
+                )
             return follow_poses(
-                arm, guide, scale=scale, gripper=fingers, speed=speed, duration=limit, while_true=acts
+                arm,
+                guide,
+                scale=1.0 if scale is None else scale,
+                gripper=fingers,
+                speed=SPEED if speed is None else speed,
+                duration=limit,
+                while_true=acts,
             )
 
         stats = []
@@ -189,29 +214,58 @@ def teleop(
     return 0
 
 
-def _check_options(leader: str | None, *, reflect: float, gripper: str, grip: str) -> None:
+def _check_options(source: str, *, reflect: float, gripper: str, grip: str) -> None:
     """Refuse options of a leader without one, and a gripper that no button moves.
 
     Raises:
         CommandRejected: there are such.
     """
-    if reflect and leader is None:
+    if reflect and source != "leader":
         raise CommandRejected(
             "reflect needs a leader that an FRI session moves", parameter="reflect", value=reflect
         )
-    if grip and (leader is None or not gripper):
+    if grip and (source != "leader" or not gripper):
         raise CommandRejected(
             "grip needs a leader and a gripper that its signal moves",
             parameter="grip",
             value=grip,
             hint="devices and poses have a button for the gripper",
         )
-    if gripper and leader is not None and not grip:
+    if gripper and source == "leader" and not grip:
         raise CommandRejected(
             "gripper needs grip, the leader's signal that opens and closes it",
             parameter="gripper",
             value=gripper,
             hint="for example --grip UserButton",
+        )
+
+
+def _check_effect(source: str, *, scale: float | None, clutch: str, host: str | None) -> None:
+    """Refuse options that have no effect on what moves the arm: "leader", "device" or "poses".
+
+    Raises:
+        CommandRejected: there is one.
+    """
+    if scale is not None and source == "device":
+        raise CommandRejected(
+            "scale needs a leader or poses, whose movements it multiplies; a device gives speeds",
+            parameter="scale",
+            value=scale,
+            hint="speed is the ceiling of the joints' speeds; heptarm jog --scale moves the arm slower by a device",
+        )
+    if clutch and source != "leader":
+        raise CommandRejected(
+            "clutch needs a leader, whose signal it is",
+            parameter="clutch",
+            value=clutch,
+            hint="devices and poses have a button of their own",
+        )
+    if host is not None and source != "poses":
+        raise CommandRejected(
+            "host needs poses, which are received there",
+            parameter="host",
+            value=host,
+            hint=f"for example --poses {PORT}",
         )
 
 

@@ -58,7 +58,7 @@ def export_model(
     if tool is not None:
         instance(tool, Tool, "tool")
     instance(scene, str, "scene")
-    if fitted is not None and not model.name.startswith(instance(fitted, FittedArm, "fitted").robot):
+    if fitted is not None and instance(fitted, FittedArm, "fitted").model.base_name != model.base_name:
         raise CommandRejected(
             f"fitted must be an arm of the {model.name}, got one of the {fitted.robot}",
             parameter="fitted",

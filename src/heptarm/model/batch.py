@@ -14,6 +14,7 @@ from heptarm.errors import LimitError, ShapeError
 from heptarm.model.inverse_kinematics import FOUND
 from heptarm.model.native import constants, many
 from heptarm.values.checks import Array, finite_entries, instance, numbers
+from heptarm.values.pose import check_rotation
 from heptarm.values.robot import RobotModel
 
 #: Whole numbers, one for each pose.
@@ -138,11 +139,12 @@ def solve_batch(
         Joint positions, shape (n, 7) [rad]; NaN in the rows of poses that `solve` refuses as unreachable.
 
     Raises:
-        ShapeError: an argument has another shape.
+        ShapeError: an argument has another shape, or the rotation of a pose is none.
         LimitError: an entry is not finite, or a Status outside 0 to 7.
     """
     instance(robot, RobotModel, "robot")
     given = _rows(poses, (4, 4), "poses")
+    check_rotation(given[:, :3, :3], "poses")
     count = len(given)
     hints = None if near is None else _hints(near, count)
     angles = np.full(count, np.nan) if e1 is None else _for_each(e1, count, "e1")

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from heptarm.errors import CommandRejected, ShapeError, Unreachable
 from heptarm.model.native import Joints, Matrix, Reals, Spans, constants, one, values_of
 from heptarm.values.checks import Array, array, finite, finite_entries, instance, integer, numbers
-from heptarm.values.pose import NOT_GIVEN, Pose, Redundancy
+from heptarm.values.pose import NOT_GIVEN, Pose, Redundancy, check_rotation
 from heptarm.values.robot import RobotModel
 
 #: Outcomes of a solution in C.
@@ -30,12 +30,17 @@ _MIDDLE = Joints()
 
 
 def _matrix(pose: Pose | Array) -> Reals:
-    """A pose or a homogeneous matrix for C."""
+    """A pose or a homogeneous matrix for C.
+
+    Raises:
+        ShapeError: it has another shape, or is no rotation.
+    """
     if isinstance(pose, Pose):
         return Matrix(*pose.matrix.ravel().tolist())
     given = finite_entries(numbers(pose, "pose", "a Pose or a matrix of shape (4, 4)"), "pose")
     if given.shape not in ((4, 4), (3, 4)):
         raise ShapeError(f"pose must have shape (4, 4), got {given.shape}", parameter="pose", value=pose)
+    check_rotation(given[:3, :3], "pose")
     return Matrix(*given.ravel().tolist())
 
 
@@ -168,6 +173,7 @@ def solve(
     Raises:
         CommandRejected: both E1 and an arm angle are given.
         LimitError: a value is outside its range, such as Status 8.
+        ShapeError: a wrong shape, or a matrix whose rotation is none.
         Unreachable: no solution within the joint limits; the text names the cause.
     """
     _robot(robot)

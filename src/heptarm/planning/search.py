@@ -14,6 +14,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from math import inf, sqrt
+from numbers import Real
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -723,10 +724,10 @@ def _each(goal: object) -> list[Array | Pose | Region]:
         isinstance(goal, Sequence)
         and not isinstance(goal, str)
         and goal
-        and not isinstance(goal[0], int | float)
+        and not isinstance(goal[0], Real)  # numpy's numbers, too
     ):
         return [element for part in goal for element in _each(part)]
-    if isinstance(goal, np.ndarray) and goal.ndim == 2:
+    if isinstance(goal, np.ndarray) and goal.ndim == 2 and len(goal):
         return [element for row in goal for element in _each(row)]
     if isinstance(goal, np.ndarray | Sequence) and not isinstance(goal, str):
         return [array(goal, 7, "goal")]

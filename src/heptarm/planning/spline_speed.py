@@ -15,6 +15,7 @@ from heptarm.errors import NoPath
 from heptarm.model.batch import forward_batch
 from heptarm.model.dynamics import inverse_dynamics_rows
 from heptarm.planning.lookahead import PlanSamples
+from heptarm.planning.plan import Plan
 from heptarm.planning.planner import plan
 from heptarm.planning.seam import JointDynamics, JointSpline, Ptp
 from heptarm.values.checks import Array
@@ -33,7 +34,7 @@ class SpeedLimits:
     """What bounds the speed along a spline besides the limits of the joints.
 
     Attributes:
-        speed: fraction of each joint's maximum, (0, 1].
+        speed: fraction of each joint's maximum for which the duration is computed, (0, 1].
         tcp_speed: of the origin of the tool frame [m/s]; infinite: any.
         tcp: pose of the tool frame in the flange frame.
         load: on the flange; None: torques are not looked at.
@@ -45,7 +46,9 @@ class SpeedLimits:
     load: Body | None
 
     def time(self, robot: RobotModel, points: Array) -> tuple[float, Dynamics]:
-        """Duration of a spline through points [s], and the dynamics with which the cabinet keeps the limits.
+        """Duration of a spline through points at the speed [s], and dynamics with which limits are kept at any speed.
+
+        The dynamics are those of full speed, since the arm may move along the spline at another speed than this one.
 
         Args:
             robot: the robot.
@@ -55,17 +58,14 @@ class SpeedLimits:
             PlanError: the spline leaves the limits of the joints.
             NoPath: the load is too heavy for the torques at rest.
         """
-        speed, acceleration = self.speed, 1.0
+        if self.load is None and self.tcp_speed == inf:
+            planned = _planned(robot, points, self.speed, 1.0)
+            return (0.0 if planned.path is None else planned.duration), DEFAULT
+        speed, acceleration = 1.0, 1.0
         for _ in range(_ROUNDS):
-            motion = JointSpline(
-                points=tuple(Ptp(q=tuple(point.tolist())) for point in points[1:]),
-                dynamics=JointDynamics(velocity=(speed,) * 7, acceleration=(acceleration,) * 7),
-            )
-            planned = plan(robot, motion, points[0])
+            planned = _planned(robot, points, speed, acceleration)
             if planned.path is None:
                 return 0.0, DEFAULT
-            if self.load is None and self.tcp_speed == inf:
-                return planned.duration, DEFAULT
             samples = PlanSamples.of(planned, _STEP)
             slower = self.tcp_speed / max(self._fastest(robot, samples), 1e-9)
             weaker = inf if self.load is None else _torque_factor(robot, samples, self.load)
@@ -73,7 +73,9 @@ class SpeedLimits:
                 break
             speed *= min(1.0, _AIM * slower)
             acceleration *= min(1.0, _AIM * weaker)
-        return planned.duration, _dynamics(speed if speed < self.speed else None, acceleration)
+        if self.speed < speed:
+            planned = _planned(robot, points, self.speed, acceleration)
+        return planned.duration, _dynamics(speed, acceleration)
 
     def _fastest(self, robot: RobotModel, samples: PlanSamples) -> float:
         """Largest speed of the origin of the tool frame between two samples [m/s]."""
@@ -106,5 +108,17 @@ def _torque_factor(robot: RobotModel, samples: PlanSamples, load: Body) -> float
     return float(((1.0 - weight) / moving).min())
 
 
-def _dynamics(speed: float | None, acceleration: float) -> Dynamics:
-    return Dynamics(joint_speed=speed, joint_acceleration=acceleration if acceleration < 1.0 else None)
+def _planned(robot: RobotModel, points: Array, speed: float, acceleration: float) -> Plan:
+    """The spline through points with fractions of the joints' maxima."""
+    motion = JointSpline(
+        points=tuple(Ptp(q=tuple(point.tolist())) for point in points[1:]),
+        dynamics=JointDynamics(velocity=(speed,) * 7, acceleration=(acceleration,) * 7),
+    )
+    return plan(robot, motion, points[0])
+
+
+def _dynamics(speed: float, acceleration: float) -> Dynamics:
+    return Dynamics(
+        joint_speed=speed if speed < 1.0 else None,
+        joint_acceleration=acceleration if acceleration < 1.0 else None,
+    )

@@ -237,7 +237,7 @@ class _Follower:
         self._released, self._pressed = not button, False
         self._anchor: _Anchor | None = None
         self._last: Pose | None = None
-        self._target = arm.pose(state=servo.start)
+        self._target = arm.pose(state=servo.start)  # the last one that was not refused
         self._rest_wrench = np.zeros(6)
 
     def step(self, seen: PoseInput) -> None:
@@ -246,6 +246,7 @@ class _Follower:
         follows = (
             seen.pose is not None and self._released and (not self._button or self._button in seen.buttons)
         )
+        target = self._target
         if seen.pose is None or not follows:
             self._anchor = None
         elif self._anchor is None or self._jumped(seen.pose):
@@ -254,12 +255,12 @@ class _Follower:
             )
             self._rest_wrench = self._wrench()
         else:
-            self._target = self._anchor.target(seen.pose)
+            target = self._anchor.target(seen.pose)
         self._last = seen.pose
         try:
-            self._target = self._servo.set(self._target)
+            self._target = self._servo.set(target)
         except (OutsideWorkspace, CollisionForeseen):
-            pass  # it rests before the wall; the hand has to come back
+            pass  # it rests before the wall, where the next press of the clutch begins; the hand has to come back
         feel = getattr(self._device, "feel", None)
         if feel is not None:
             feel(self._felt() if follows else np.zeros(6))

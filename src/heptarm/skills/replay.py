@@ -12,6 +12,7 @@ import numpy as np
 from heptarm.arm.verbs import ArmVerbs
 from heptarm.arm.watchdog import REPLAY
 from heptarm.errors import CommandRejected, LimitError, MotionAborted, ShapeError, StaleState
+from heptarm.skills.taught_path import TaughtPath
 from heptarm.values.checks import Array, Value, callback, instance, within, word
 from heptarm.values.condition.condition import Condition
 from heptarm.values.mode.mode import Mode
@@ -34,8 +35,6 @@ _OVERLAP = 0.005
 _LONGEST = 1.0
 #: Of a spline: the relative difference in duration that is none, and how many plans may be made for it.
 _SAME_TIME, _PLANS = 0.005, 10
-#: Points of a trajectory with which a position is compared.
-_DENSE = 2001
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,7 +44,8 @@ class Replay(Value):
     Attributes:
         result: how its motion ended.
         deviation: largest distance of any axis from the taught path, whatever the time [rad].
-        lag: median delay of the arm [s], in the time of the trajectory; NaN for a spline, which has its own timing.
+        lag: median delay of the arm [s], in the time of the trajectory, up to 2 s; NaN for a spline, which has its own
+            timing, and where nothing moves.
     """
 
     result: Result
@@ -149,8 +149,7 @@ class _Run:
             handle.cancel()
         result = handle.wait()
         self._report(handle.progress)  # the states may have ended before it was known how the motion did
-        deviation = max((_nearest(self.trajectory, q)[0] for q in seen), default=0.0)
-        return Replay(result, deviation)
+        return Replay(result, TaughtPath(self.trajectory).deviation(seen))
 
     def _speed_of(self, spline: JointSpline) -> float:
         """The speed, a fraction of each axis' maximum, at which a spline takes the wanted time; 1: it takes longer."""
@@ -199,22 +198,14 @@ class _Run:
         if result is None:
             raise MotionAborted("the servo motion has not ended")
         ended = replace(result, cause=Cause.FINISHED) if result.cause is Cause.CANCELLED else result
-        nearest = [(t, *_nearest(trajectory, q)) for t, q in seen]
-        lags = [t - there for t, _, there in nearest if t < trajectory.duration]
-        deviation = max((distance for _, distance, _ in nearest), default=0.0)
-        return Replay(ended, deviation, float(np.median(lags)) if lags else float("nan"))
+        path = TaughtPath(trajectory)
+        moving = [(t, q) for t, q in seen if t < trajectory.duration]
+        lag = path.lag([t for t, _ in moving], [q for _, q in moving])
+        return Replay(ended, path.deviation([q for _, q in seen]), lag)
 
     def _report(self, progress: float) -> None:
         if self.on_progress is not None:
             self.on_progress(progress)
-
-
-def _nearest(trajectory: Trajectory, q: Array) -> tuple[float, float]:
-    """Distance of a position from the taught path [rad], and the time of the nearest point on it [s]."""
-    times = np.linspace(0.0, trajectory.duration, _DENSE)
-    distances = np.abs(trajectory.positions(times) - q).max(axis=1)
-    nearest = int(distances.argmin())
-    return float(distances[nearest]), float(times[nearest])
 
 
 def _check_speed(trajectory: Trajectory, speed_scaling: float, allowed: Array) -> None:

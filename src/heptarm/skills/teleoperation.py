@@ -27,8 +27,10 @@ if TYPE_CHECKING:
 SCALE, TURN_SCALE = 0.05, 0.2
 #: Default of the readings per second [Hz].
 RATE = 50.0
-#: Ceiling of the joints' speeds, a fraction of their maxima; and how much faster a diagonal is than one axis.
-_JOINT_SPEED, _DIAGONAL = 0.5, 3.0**0.5
+#: Default of the ceiling of the joints' speeds, a fraction of their maxima.
+JOINT_SPEED = 0.5
+#: How much faster a diagonal is than one axis.
+_DIAGONAL = 3.0**0.5
 
 
 def check_device(device: InputDevice) -> InputDevice:
@@ -59,6 +61,7 @@ def teleoperate(
     duration: float | None = None,
     while_true: Callable[[DeviceInput], bool] | None = None,
     rate: float = RATE,
+    speed: float = JOINT_SPEED,
     watchdog: float | None = None,
     keep_clear_of: ClearanceModel | None = None,
     elbow: Elbow | None = None,
@@ -80,6 +83,7 @@ def teleoperate(
         duration: end after this time [s]; None: never.
         while_true: called with each reading; the arm is moved as long as it returns something true. None: always.
         rate: readings per second [Hz].
+        speed: ceiling of the joints' speeds, a fraction of their maxima, (0, 1].
         watchdog: silence of this program after which the cabinet stops the arm [s]; None: that of `Arm.servo`.
         keep_clear_of: model of bodies to brake before; see `Arm.servo`.
         elbow: what the redundant joint does, "keep" or "center"; see `Arm.servo`. None: "keep".
@@ -96,20 +100,20 @@ def teleoperate(
         MotionAborted: the motion ended early, as by a stop.
     """
     check_device(device)
-    speed = within(scale, "scale", 0.0, 1.0, above=True, unit="m/s")
+    straight = within(scale, "scale", 0.0, 1.0, above=True, unit="m/s")
     turn = within(turn_scale, "turn_scale", 0.0, 2.0, above=True, unit="rad/s")
     limit = None if duration is None else within(duration, "duration", 0.0, 1e6, above=True, unit="s")
     roles = device.roles
     button = roles.dead_man if dead_man is None else dead_man
-    factors = np.repeat([speed, turn], 3)
+    factors = np.repeat([straight, turn], 3)
     released, pressed = not button, False
     with arm.servo(
         "twist",
         frame=frame,
         rate=rate,
         watchdog=watchdog,
-        speed=_JOINT_SPEED,
-        speed_mps=_DIAGONAL * speed,
+        speed=speed,
+        speed_mps=_DIAGONAL * straight,
         speed_radps=_DIAGONAL * turn,
         keep_clear_of=keep_clear_of,
         elbow=elbow,

@@ -149,7 +149,7 @@ class FittedArm(Value):
     """An arm as it was measured: `sim://iiwa14?fitted=FILE` behaves like it.
 
     Attributes:
-        robot: name of the robot, such as "iiwa14".
+        robot: name of the robot with the flange with which it was recorded, such as "iiwa14" or "iiwa14+touch".
         numbers: the quantities that are known; of each name at most one.
         contradictions: what the arm did that these numbers do not explain, in sentences.
 

@@ -202,7 +202,7 @@ class Trajectory(Value):
         return file
 
     @staticmethod
-    def load(path: str | Path, *, rate: float = 100.0) -> Trajectory:
+    def load(path: str | Path, *, rate: float | None = None) -> Trajectory:
         """Read a file that `save` has written, or a table (.csv, .txt) of another program.
 
         A table has seven columns of joint positions [rad], A1 to A7, and may have a column of times [s] before them. In
@@ -210,14 +210,15 @@ class Trajectory(Value):
 
         Args:
             path: the file.
-            rate: rows per second of a table that has no times [Hz].
+            rate: rows per second of a table that has no times in seconds [Hz]; None: 100, if it has no times at all.
 
         Raises:
-            CommandRejected: the file cannot be read or is neither; of a table the text has line and column.
+            CommandRejected: the file cannot be read or is neither, or the times of a table may not be in seconds and
+                there is no rate; of a table the text has line and column.
         """
         file = path_of(path)
         if file.suffix.lower() in (".csv", ".txt"):
-            rows = within(rate, "rate", 0.0, 10000.0, above=True, unit="Hz")
+            rows = None if rate is None else within(rate, "rate", 0.0, 10000.0, above=True, unit="Hz")
             content = dict(zip(("times", "q"), read_table(file, rate=rows), strict=True))
             robot = ""
         else:
