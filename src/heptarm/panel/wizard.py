@@ -164,7 +164,7 @@ class Wizard:
             self._arm.stop()
 
     def end(self) -> None:
-        """End the measurement before its next motion; what moves now is stopped by whoever calls this."""
+        """End the measurement before its next motion; the caller stops what moves now."""
         with self._changed:
             if self._step.is_running:
                 self._is_given_up, self._answer = True, False
