@@ -1,0 +1,124 @@
+"""Goals that end before they move the arm: each has its result at once, and none moves it later."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from heptarm.ros.trajectory.goal import GoalOutcome, GoalResult, TrajectoryGoal, TrajectoryPoint
+from heptarm.ros.trajectory.runner import ControlStep, GoalFeedback
+from heptarm.ros.trajectory.streamed_execution import CommandStream, StreamedExecution
+from heptarm.values.robot import robot
+
+NAMES = tuple(f"A{i}" for i in range(1, 8))
+HOME = np.array([0.0, 0.0, 0.0, -1.5, 0.0, 1.5, 0.0])
+PATIENCE = 10.0
+STATE = SimpleNamespace(
+    sampled=0,
+    q=HOME,
+    q_cmd=HOME,
+    dq=np.zeros(7),
+    motion=None,
+    groups=SimpleNamespace(safety=None),
+)
+GOAL = TrajectoryGoal(NAMES, (TrajectoryPoint(1.0, tuple(HOME + 0.1)),))
+
+
+class Results:
+    """Receives results."""
+
+    def __init__(self) -> None:
+        self.results: list[GoalResult] = []
+        self._changed = threading.Condition()
+
+    def on_feedback(self, feedback: GoalFeedback) -> None:
+        pass
+
+    def on_result(self, result: GoalResult) -> None:
+        with self._changed:
+            self.results.append(result)
+            self._changed.notify_all()
+
+    def until(self, count: int) -> GoalResult:
+        """Wait for so many results; returns the last one."""
+        with self._changed:
+            assert self._changed.wait_for(lambda: len(self.results) >= count, PATIENCE), self.results
+            return self.results[-1]
+
+
+class StillStream:
+    """A motion that is never commanded to leave home."""
+
+    end_reason = "the test is over"
+
+    def __init__(self, now: Callable[[], float]) -> None:
+        self._now = now
+        self.commands: list[Any] = []
+
+    def tick(self) -> float:
+        threading.Event().wait(1e-3)
+        return self._now()
+
+    def command(self, step: ControlStep) -> None:
+        self.commands.append(step.command.q)
+
+
+class Streamed(StreamedExecution):
+    """Opens its motion when a test lets it."""
+
+    def __init__(self, arm: Any, listener: Results) -> None:
+        self.opening, self.may_open = threading.Event(), threading.Event()
+        self.stream = StillStream(lambda: self.now)
+        super().__init__(arm, NAMES, listener, linger=0.01)
+
+    @contextmanager
+    def _motion(self) -> Iterator[CommandStream]:
+        self.opening.set()
+        assert self.may_open.wait(PATIENCE)
+        yield self.stream
+
+
+@pytest.fixture
+def results() -> Results:
+    return Results()
+
+
+@pytest.fixture
+def streamed(results: Results) -> Iterator[Streamed]:
+    arm = SimpleNamespace(state=STATE, robot=robot("iiwa14"))
+    made = Streamed(cast(Any, arm), results)
+    yield made
+    made.may_open.set()
+    made.close()
+
+
+@pytest.mark.parametrize("how", ["cancel", "abort", "drop"])
+def test_a_goal_that_ends_before_the_thread_looks_has_a_result(
+    streamed: Streamed, results: Results, how: str
+) -> None:
+    for count in range(1, 6):
+        with streamed._changed:  # the thread looks when the goal has ended already
+            number = streamed.accept(GOAL)
+            getattr(streamed, how)(number if how == "cancel" else "the reason")
+        end = results.until(count)
+        assert end.number == number
+        assert end.outcome is (GoalOutcome.CANCELED if how == "cancel" else GoalOutcome.ABORTED)
+    assert not streamed.opening.is_set()
+
+
+def test_a_goal_that_is_aborted_while_its_motion_opens_does_not_move(
+    streamed: Streamed, results: Results
+) -> None:
+    streamed.accept(GOAL)
+    assert streamed.opening.wait(PATIENCE)
+    streamed.abort("stopped")
+    streamed.may_open.set()
+    assert results.until(1).text == "stopped"
+    assert streamed.wait_idle(PATIENCE)
+    assert all((q == HOME).all() for q in streamed.stream.commands)
