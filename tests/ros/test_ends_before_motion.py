@@ -13,7 +13,9 @@ import pytest
 
 from heptarm.ros.trajectory.goal import GoalOutcome, GoalResult, TrajectoryGoal, TrajectoryPoint
 from heptarm.ros.trajectory.runner import ControlStep, GoalFeedback
+from heptarm.ros.trajectory.spline_execution import SplineExecution
 from heptarm.ros.trajectory.streamed_execution import CommandStream, StreamedExecution
+from heptarm.values.result import Cause
 from heptarm.values.robot import robot
 
 NAMES = tuple(f"A{i}" for i in range(1, 8))
@@ -122,3 +124,53 @@ def test_a_goal_that_is_aborted_while_its_motion_opens_does_not_move(
     assert results.until(1).text == "stopped"
     assert streamed.wait_idle(PATIENCE)
     assert all((q == HOME).all() for q in streamed.stream.commands)
+
+
+class SplineArm:
+    """An arm at rest; each motion sent to it is noted, and ends when it is cancelled or a test ends it."""
+
+    def __init__(self) -> None:
+        self.state, self.robot = STATE, robot("iiwa14")
+        self.motions: list[SplineHandle] = []
+        self.on_start: Callable[[], None] = lambda: None
+
+    def start(self, motion: object, *, speed: float, when: str) -> SplineHandle:
+        self.on_start()
+        self.motions.append(SplineHandle())
+        return self.motions[-1]
+
+
+class SplineHandle:
+    """A motion of `SplineArm`."""
+
+    def __init__(self) -> None:
+        self.ended, self.cause = threading.Event(), Cause.FINISHED
+
+    @property
+    def done(self) -> bool:
+        return self.ended.is_set()
+
+    def cancel(self) -> None:
+        self.cause = Cause.CANCELLED
+        self.ended.set()
+
+    def wait(self, timeout: float) -> Any:
+        assert self.ended.wait(timeout)
+        return SimpleNamespace(cause=self.cause, text="")
+
+
+@pytest.fixture
+def spline_arm() -> SplineArm:
+    return SplineArm()
+
+
+@pytest.fixture
+def spline(spline_arm: SplineArm, results: Results) -> Iterator[SplineExecution]:
+    made = SplineExecution(cast(Any, spline_arm), NAMES, results)
+    yield made
+    made.close()
+
+
+def test_without_a_goal_there_is_none_to_cancel(spline: SplineExecution, streamed: Streamed) -> None:
+    assert not spline.cancel(spline.goal)
+    assert not streamed.cancel(streamed.goal)

@@ -182,7 +182,7 @@ class SplineExecution(ExecutionThread):
     def cancel(self, number: int) -> bool:
         """Cancel a goal; the arm brakes. False: it is not active."""
         with self._changed:
-            if self.goal != number:
+            if self._active is None or self._active.number != number:
                 return False
             self._end(GoalOutcome.CANCELED, ErrorCode.SUCCESSFUL, "cancelled; the arm brakes")
             self._changed.notify_all()
