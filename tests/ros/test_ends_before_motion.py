@@ -132,11 +132,12 @@ class SplineArm:
     def __init__(self) -> None:
         self.state, self.robot = STATE, robot("iiwa14")
         self.motions: list[SplineHandle] = []
-        self.on_start: Callable[[], None] = lambda: None
+        self.on_start: Callable[[], object] = lambda: None
+        self.handle: type[SplineHandle] = SplineHandle
 
     def start(self, motion: object, *, speed: float, when: str) -> SplineHandle:
         self.on_start()
-        self.motions.append(SplineHandle())
+        self.motions.append(self.handle())
         return self.motions[-1]
 
 
@@ -174,3 +175,30 @@ def spline(spline_arm: SplineArm, results: Results) -> Iterator[SplineExecution]
 def test_without_a_goal_there_is_none_to_cancel(spline: SplineExecution, streamed: Streamed) -> None:
     assert not spline.cancel(spline.goal)
     assert not streamed.cancel(streamed.goal)
+
+
+def test_a_goal_that_waits_for_the_last_one_to_brake_does_not_move_after_an_abort(
+    spline: SplineExecution, spline_arm: SplineArm, results: Results
+) -> None:
+    braking, may_rest = threading.Event(), threading.Event()
+
+    class Slow(SplineHandle):
+        def cancel(self) -> None:
+            braking.set()
+
+        def wait(self, timeout: float) -> Any:
+            assert may_rest.wait(timeout)
+            super().cancel()
+            return super().wait(timeout)
+
+    started = threading.Event()
+    spline_arm.handle, spline_arm.on_start = Slow, started.set
+    spline.accept(GOAL)
+    assert started.wait(PATIENCE)
+    spline.accept(GOAL)
+    assert braking.wait(PATIENCE)
+    spline.abort("stopped")
+    may_rest.set()
+    assert spline.wait_idle(PATIENCE)
+    assert results.until(2).text == "stopped"
+    assert len(spline_arm.motions) == 1

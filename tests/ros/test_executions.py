@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from heptarm.errors import CommandRejected
+from heptarm.errors import CommandRejected, NotReady
 from heptarm.ros.node.driver import Driver
 from heptarm.ros.node.parameters import NodeConfiguration
 from heptarm.ros.trajectory.goal import (
@@ -222,6 +222,42 @@ def _commanded(driver: Driver, recorder: Recorder) -> None:
             time.sleep(0.1)
     recorder.until(lambda: bool(recorder.ends))
     assert recorder.ends[-1].outcome is GoalOutcome.SUCCEEDED, recorder.ends
+
+
+def test_a_stop_ends_a_goal_before_its_start(driver: Driver, recorder: Recorder) -> None:
+    later = replace(goal(driver, duration=1.0), start=driver.now + 2.0)
+    number = driver.accept(later)
+    driver.stop()
+    recorder.until(lambda: bool(recorder.ends))
+    assert (recorder.ends[0].number, recorder.ends[0].outcome) == (number, GoalOutcome.ABORTED)
+    assert recorder.ends[0].text == "stopped"
+    assert later.start is not None
+    time.sleep(max(0.0, later.start + 0.5 - driver.now))
+    assert np.abs(driver.arm.state.q - HOME).max() < 1e-3
+
+
+@pytest.mark.parametrize("execution", ["servo"], indirect=True)
+def test_after_a_stop_messages_that_go_on_do_not_move_the_arm(driver: Driver) -> None:
+    def publish(seconds: float, *, refused: bool) -> float:
+        """Publish velocities of A7; returns how far it moved [rad]."""
+        begin, end = driver.arm.state.q[6], time.monotonic() + seconds
+        count = 0
+        while time.monotonic() < end:
+            try:
+                driver.follow_velocity(np.array([0, 0, 0, 0, 0, 0, 0.3]))
+            except NotReady as error:
+                assert "stopped" in str(error)
+                count += 1
+            time.sleep(0.02)
+        assert bool(count) == refused
+        return float(driver.arm.state.q[6] - begin)
+
+    assert publish(1.0, refused=False) > 0.02
+    driver.stop()
+    publish(1.0, refused=True)  # it brakes
+    assert abs(publish(1.0, refused=True)) < 1e-3
+    time.sleep(0.5)  # longer than command_timeout
+    assert publish(1.0, refused=False) > 0.02
 
 
 @pytest.mark.parametrize("execution", ["servo"], indirect=True)

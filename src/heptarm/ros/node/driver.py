@@ -35,6 +35,7 @@ from heptarm.ros.trajectory.check import check_form
 from heptarm.ros.trajectory.execution import Execution, GoalListener
 from heptarm.ros.trajectory.fri_execution import FriExecution
 from heptarm.ros.trajectory.goal import GoalRefused, GoalResult, TrajectoryGoal, TrajectoryPoint
+from heptarm.ros.trajectory.point_stream import is_streamed
 from heptarm.ros.trajectory.runner import GoalFeedback
 from heptarm.ros.trajectory.send_times import PublishInfo
 from heptarm.ros.trajectory.servo_execution import ServoExecution
@@ -127,6 +128,11 @@ class Driver:
         self._active = False
         self._handle: MotionHandle | None = None
         self._starting = threading.Lock()  # messages and goals come in several threads
+        self._stop = (
+            object()
+        )  # another one with each stop: what was requested before one must not begin after it
+        self._is_stopping = False  # the motion of a goal that was stopped may still be open
+        self._beginning = threading.Lock()  # of goals and tasks; held only for a moment, for `stop` needs it
         self._task: ArmTask | None = None
         self._results: dict[int, GoalResult] = {}
         self._has_result = threading.Condition()
@@ -278,16 +284,24 @@ class Driver:
             raise GoalRefused("the node is not active", hint="activate it")
         if self.link_error:
             raise GoalRefused(f"no connection: {self.link_error}")
+        last_stop = self._stop
         goal = goal.renamed(self.configuration.own)
         # what is malformed must not end another motion
         check_form(goal, self.configuration.joints, self._execution.settings.rules)
         try:
+            if is_streamed(goal, self.now):
+                self._stream.admit()
             self._check_ready()
             self._regain_control()
             self._end_motions("preempted by a trajectory")
+            self._wait_for_stop()
+            with self._beginning:
+                self._check_not_stopped(last_stop)
+                return self._execution.accept(goal)
+        except GoalRefused:
+            raise
         except HeptarmError as error:
             raise GoalRefused(str(error)) from error
-        return self._execution.accept(goal)
 
     def run_task(self, name: str, work: Callable[[], object]) -> ArmTask:
         """Run a function that moves the arm several times, after bringing any other motion to rest.
@@ -299,13 +313,16 @@ class Driver:
         Raises:
             HeptarmError: refused; the text gives the reason.
         """
+        last_stop = self._stop
         self._check_active()
         self._check_ready()
         self._execution.abort(f"preempted by {name}")
         self._execution.wait_idle(_REST_TIMEOUT)
         self._end_motions(f"preempted by {name}")
-        self._task = ArmTask(self._arm, name, work)
-        return self._task
+        with self._beginning:
+            self._check_not_stopped(last_stop)
+            self._task = ArmTask(self._arm, name, work)
+            return self._task
 
     def _end_motions(self, reason: str) -> None:
         """Bring to rest what moves the arm besides goals."""
@@ -320,6 +337,21 @@ class Driver:
     def _end_task(self, reason: str) -> None:
         if self._task is not None:
             self._task.end(reason)
+
+    def _wait_for_stop(self) -> None:
+        """Wait until a stop has ended the motion of the last goal: a new goal must not begin in that motion."""
+        if self._is_stopping:
+            if not self._execution.wait_idle(_REST_TIMEOUT):
+                raise NotReady(
+                    f"the last goal was stopped, and its motion has not ended within {_REST_TIMEOUT:g} s",
+                    hint="request it again when the arm rests",
+                )
+            self._is_stopping = False
+
+    def _check_not_stopped(self, last_stop: object) -> None:
+        """Refuse what was requested before a stop and would begin after it; `last_stop` is that before the request."""
+        if self._stop is not last_stop:
+            raise NotReady("the arm was stopped meanwhile", hint="request it again")
 
     def at(self, time: float) -> TrajectorySample | None:
         """Evaluate the active goal at a time on the clock of `now` [s]; None: there is none at that time."""
@@ -392,6 +424,7 @@ class Driver:
         Raises:
             HeptarmError: refused; the text gives the reason.
         """
+        last_stop = self._stop
         self._check_active()
         if when == "replace":
             self._end_task("preempted by a command")
@@ -401,9 +434,12 @@ class Driver:
         limit = self.configuration.values["speed"] if speed is None else speed
         condition = self.guard if until is None else until
         with self._starting:
+            self._check_not_stopped(last_stop)
             handle = self._handle = self._arm.start(
                 motion, mode=mode, speed=limit, until=condition, then=then, when=when
             )
+        if self._stop is not last_stop:  # the cabinet may have had the stop before the motion
+            handle.cancel()
         handle.add_event_callback(lambda event: self._listener.on_event(handle.id, event))
         return handle
 
@@ -517,12 +553,15 @@ class Driver:
         self.accept(TrajectoryGoal(self.configuration.joints, (point,), from_topic=True, sent=sent))
 
     def _prepare_stream(self) -> None:
+        last_stop = self._stop
         self._check_active()
         self._check_no_task()
+        self._stream.admit()  # what is refused must not end a goal
         if not self._stream.active:
             if self._execution.busy:
                 self._execution.abort("preempted by a servo topic")
             self._execution.wait_idle(_REST_TIMEOUT)
+            self._check_not_stopped(last_stop)
 
     def _check_active(self) -> None:
         if not self._active:
@@ -545,14 +584,27 @@ class Driver:
         self._stream.guard = value
 
     def stop(self, kind: Literal["path", "fast", "after_motion"] = "path") -> None:
-        """Stop the arm, see `Arm.stop`. A task counts as one motion: "after_motion" lets it finish.
+        """Stop the arm, see `Arm.stop`, and end what is to move it: goals, also before their start, tasks, streams.
+
+        A stream of messages is followed again after a silence of `command_timeout`. A task counts as one motion:
+        "after_motion" lets it finish, and goals and streams go on.
 
         Raises:
             HeptarmError: the arm cannot be stopped; the text gives the reason.
         """
-        if kind != "after_motion":
+        if kind == "after_motion":
+            self._arm.stop(kind)
+            return
+        self._stop, self._is_stopping = object(), True
+        self._stream.hold_off()
+        if self._task is not None:
+            self._task.expect_end("stopped")
+        try:
+            self._arm.stop(kind)
+        finally:
+            with self._beginning:
+                self._execution.abort("stopped")
             self._end_task("stopped")
-        self._arm.stop(kind)
 
     def _on_collision(self, found: Collision) -> None:
         self._stream.block(str(found))

@@ -237,6 +237,8 @@ class SplineExecution(ExecutionThread):
         if active.goal.start is not None and not self._wait_for_start(active, active.goal.start):
             return
         motion = as_spline(active.trajectory, self._arm.robot, self._speed)
+        if self._active is not active:  # it ended while the last one braked, or in the planning
+            return
         active.handle = handle = self._arm.start(motion, speed=1.0, when="queue")
         active.begin = self.now
         while self._active is active and not handle.done:
