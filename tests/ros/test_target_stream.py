@@ -9,6 +9,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
+from heptarm.arm.motion.servo import JointServo
 from heptarm.errors import NotReady
 from heptarm.ros.node.parameters import NodeConfiguration
 from heptarm.ros.node.target_stream import TargetStream
@@ -19,23 +20,23 @@ HOME = np.array([0.0, 0.0, 0.0, -1.5, 0.0, 1.5, 0.0])
 TIMEOUT = 0.1
 
 
-class NotedServo:
+class NotedServo(JointServo):
     """A servo motion that takes note of its targets."""
 
     def __init__(self, arm: NotedArm) -> None:
-        self._arm, self.active, self.result = arm, True, None
-        self.start = SimpleNamespace(q=arm.q)
+        self._arm, self._active, self._result = arm, True, None
+        self._start = cast(Any, arm.state)
 
     def __enter__(self) -> NotedServo:
         self._arm.on_open()
         return self
 
-    def set(self, q: Array, dq: Array | None = None) -> Array:
+    def set(self, q: Any, dq: Any = None) -> Array:
         self._arm.targets.append(q)
-        return q
+        return cast(Array, q)
 
     def close(self) -> None:
-        self.active = False
+        self._active = False
         self._arm.closed += 1
 
 
@@ -97,3 +98,36 @@ def test_a_stop_while_a_servo_motion_opens_ends_it(arm: NotedArm, stream: Target
     with pytest.raises(NotReady, match="stopped"):
         stream.joints(HOME)
     assert not arm.targets and arm.closed == 1 and not stream.active
+
+
+def test_velocities_stay_below_the_ceiling_of_the_arm(arm: NotedArm, stream: TargetStream) -> None:
+    arm.speed = 0.25
+
+    def follow() -> Any:
+        if stream._path is not None:
+            arm.q = stream._path.q
+        return arm.state
+
+    arm.connection.newest = follow
+    fastest, end = 0.0, time.monotonic() + 0.5
+    while time.monotonic() < end:
+        stream.velocity(np.array([0, 0, 0, 0, 0, 0, 2.0]))
+        assert stream._path is not None
+        fastest = max(fastest, float(stream._path.dq[6]))
+        time.sleep(5e-3)
+    assert 0.2 * arm.robot.dq_max[6] < fastest < 0.25 * arm.robot.dq_max[6]
+
+
+@pytest.mark.parametrize("kind", ["velocity", "twist"])
+def test_an_arm_that_does_not_follow_has_no_far_target(
+    arm: NotedArm, stream: TargetStream, kind: str
+) -> None:
+    end = time.monotonic() + 1.0
+    while time.monotonic() < end:
+        if kind == "velocity":
+            stream.velocity(np.array([0, 0, 0, 0, 0, 0, 1.0]))
+        else:
+            stream.twist(np.array([0.0, 0.25, 0.0, 0.0, 0.0, 0.0]))
+        time.sleep(5e-3)
+    far = max(float(np.abs(q - HOME).max()) for q in arm.targets)
+    assert 0.01 < far < 0.35

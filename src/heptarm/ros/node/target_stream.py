@@ -11,6 +11,7 @@ from typing import Any, Literal
 import numpy as np
 
 from heptarm.arm.arm import Arm
+from heptarm.arm.motion.jog import BELOW_CEILING, lag
 from heptarm.arm.motion.servo import JointServo, PoseServo
 from heptarm.errors import HeptarmError, NotReady
 from heptarm.io.clock import RealClock
@@ -205,14 +206,14 @@ class TargetStream:
         """Move with the joint velocities [rad/s] that a function returns for the path so far."""
         with self._lock:
             self.admit()
-            robot, options = self._arm.robot, self._options
+            robot, options, connection = self._arm.robot, self._options, self._arm.connection
             before = self._servo
             servo = self._joint_servo()
             now = self._clock.nanos()
             if servo is not before or self._path is None:
                 self._path = VelocityPath(
                     self._arm.state.q if servo is before else servo.start.q,
-                    speed=options.speed * robot.dq_max,
+                    speed=BELOW_CEILING * min(options.speed, self._arm.speed) * robot.dq_max,
                     acceleration=options.acceleration * robot.ddq_max,
                     q_min=robot.q_min + MARGIN,
                     q_max=robot.q_max - MARGIN,
@@ -220,10 +221,13 @@ class TargetStream:
                 )
                 self._task = None
                 self._last = now - round(_FIRST * 1e9)
-            passed = min((now - self._last) * 1e-9, self._timeout)
+            path, rate = self._path, connection.real_time_factor
+            passed = min((now - self._last) * 1e-9, self._timeout) * rate
             self._last = now
-            self._path.advance(command_at(self._path), passed)
-            servo.set(*self._path.target(_AHEAD))
+            dq = command_at(path)
+            behind = lag(path, dq, connection.newest(), now=now, rate=rate)
+            path.advance(dq, passed, [] if behind is None else [behind])
+            servo.set(*path.target(_AHEAD))
             self._again = None
 
     def pose(
