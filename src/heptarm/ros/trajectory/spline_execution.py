@@ -73,6 +73,7 @@ class _SplineGoal:
     monitor: ToleranceMonitor
     handle: MotionHandle | None = None
     begin: float = 0.0
+    finished: float | None = None  # when its motion ended
     tau: float = 0.0
     commanded: tuple[int, Array] | None = None  # the last stamp and commanded positions
 
@@ -251,6 +252,7 @@ class SplineExecution(ExecutionThread):
                 result = handle.wait(timeout=_REST_TIMEOUT)
                 if result.cause is not Cause.FINISHED:
                     self._abort_if_active(active, f"the motion ended: {result.cause.value} {result.text}")
+            active.finished = self.now
         while self._active is active:
             self._judge(active, active.trajectory.end, self._arm.state, moving=False)
             if self._active is active:
@@ -287,9 +289,8 @@ class SplineExecution(ExecutionThread):
         """End the goal if the tolerances say so."""
         measured = measured_state(state)
         self._scaling = measured.scaling
-        overdue = self.now - active.begin - active.trajectory.duration
-        if not moving:  # a spline may take less time than its trajectory
-            overdue = max(overdue, 0.0)
+        # a spline takes longer than its trajectory at a lower speed or after a pause, and is not late for that
+        overdue = -1.0 if active.finished is None else self.now - active.finished
         with self._changed:
             if self._active is active:
                 verdict = active.monitor.judge(

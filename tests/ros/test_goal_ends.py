@@ -1,17 +1,19 @@
-"""Goals that end before they move the arm: each has its result at once, and none moves it later."""
+"""How goals end on an arm that only takes note: before their motion, in the order of stops, and on a slow arm."""
 
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
 import pytest
 
-from heptarm.ros.trajectory.goal import GoalOutcome, GoalResult, TrajectoryGoal, TrajectoryPoint
+from heptarm.ros.trajectory.goal import ErrorCode, GoalOutcome, GoalResult, TrajectoryGoal, TrajectoryPoint
 from heptarm.ros.trajectory.runner import ControlStep, GoalFeedback
 from heptarm.ros.trajectory.spline_execution import SplineExecution
 from heptarm.ros.trajectory.streamed_execution import CommandStream, StreamedExecution
@@ -22,7 +24,9 @@ NAMES = tuple(f"A{i}" for i in range(1, 8))
 HOME = np.array([0.0, 0.0, 0.0, -1.5, 0.0, 1.5, 0.0])
 PATIENCE = 10.0
 STATE = SimpleNamespace(
+    stamp=0,
     sampled=0,
+    joints=None,
     q=HOME,
     q_cmd=HOME,
     dq=np.zeros(7),
@@ -202,3 +206,24 @@ def test_a_goal_that_waits_for_the_last_one_to_brake_does_not_move_after_an_abor
     assert spline.wait_idle(PATIENCE)
     assert results.until(2).text == "stopped"
     assert len(spline_arm.motions) == 1
+
+
+@pytest.mark.parametrize("arrives", [True, False])
+def test_a_spline_that_is_slowed_down_is_not_late(
+    spline: SplineExecution, spline_arm: SplineArm, results: Results, arrives: bool
+) -> None:
+    tolerances = replace(spline.settings.tolerances, goal_time=0.2)
+    spline.settings = replace(spline.settings, tolerances=tolerances)
+    started = threading.Event()
+    spline_arm.on_start = started.set
+    spline.accept(replace(GOAL, points=(TrajectoryPoint(0.1, GOAL.points[0].q),)))
+    assert started.wait(PATIENCE)
+    time.sleep(0.6)  # twice as long as the trajectory and goal_time
+    assert not results.results
+    if arrives:
+        there = HOME + 0.1
+        spline_arm.state = SimpleNamespace(**{**vars(STATE), "q": there, "q_cmd": there})
+    spline_arm.motions[0].ended.set()
+    end = results.until(1)
+    assert end.outcome is (GoalOutcome.SUCCEEDED if arrives else GoalOutcome.ABORTED)
+    assert end.code is (ErrorCode.SUCCESSFUL if arrives else ErrorCode.GOAL_TOLERANCE_VIOLATED)
