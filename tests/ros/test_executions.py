@@ -272,6 +272,19 @@ def test_a_malformed_goal_leaves_a_command_alone(driver: Driver) -> None:
 
 
 @pytest.mark.parametrize("execution", ["servo"], indirect=True)
+def test_a_goal_above_the_speed_limit_of_the_arm_is_refused_whenever_that_was_set(driver: Driver) -> None:
+    fast = goal(driver)
+    driver.arm.speed = 0.05
+    with pytest.raises(GoalRefused, match="speed"):
+        driver.accept(fast)
+    driver.configure(driver.configuration)  # as any live parameter does
+    with pytest.raises(GoalRefused, match="speed"):
+        driver.accept(fast)
+    driver.arm.speed = 1.0
+    assert driver.cancel(driver.accept(fast))
+
+
+@pytest.mark.parametrize("execution", ["servo"], indirect=True)
 def test_a_twist_moves_and_silence_ends_it(driver: Driver) -> None:
     begin = driver.arm.state.pose.xyz
     deadline = time.monotonic() + PATIENCE

@@ -36,7 +36,7 @@ from heptarm.ros.trajectory.execution import Execution, GoalListener
 from heptarm.ros.trajectory.fri_execution import FriExecution
 from heptarm.ros.trajectory.goal import GoalRefused, GoalResult, TrajectoryGoal, TrajectoryPoint
 from heptarm.ros.trajectory.point_stream import is_streamed
-from heptarm.ros.trajectory.runner import GoalFeedback
+from heptarm.ros.trajectory.runner import ExecutionSettings, GoalFeedback
 from heptarm.ros.trajectory.send_times import PublishInfo
 from heptarm.ros.trajectory.servo_execution import ServoExecution
 from heptarm.ros.trajectory.spline_execution import SplineExecution
@@ -173,16 +173,21 @@ class Driver:
 
     def _make_execution(self) -> Execution:
         """Make the execution that the parameters select."""
-        config = self.configuration
+        config, settings = self.configuration, self._settings()
         if config.values["execution"] == "spline":
             speed = config.values["servo.speed"]
-            return SplineExecution(self._arm, config.joints, self, speed=speed, settings=config.settings)
+            return SplineExecution(self._arm, config.joints, self, speed=speed, settings=settings)
         if config.values["execution"] == "fri":
-            return FriExecution(self._arm, config.joints, self, options=config.fri, settings=config.settings)
-        settings = config.settings
-        ceiling = min(settings.rules.speed, self._arm.speed)  # a faster goal is refused, not followed late
-        settings = replace(settings, rules=replace(settings.rules, speed=ceiling))
+            return FriExecution(self._arm, config.joints, self, options=config.fri, settings=settings)
         return ServoExecution(self._arm, config.joints, self, options=config.servo, settings=settings)
+
+    def _settings(self) -> ExecutionSettings:
+        """How goals are executed, by the parameters and the present speed limit of the arm."""
+        settings = self.configuration.settings
+        if self.configuration.values["execution"] != "servo":
+            return settings  # a spline takes longer, and the speed limit is none of FRI
+        ceiling = min(settings.rules.speed, self._arm.speed)  # a faster goal is refused, not followed late
+        return replace(settings, rules=replace(settings.rules, speed=ceiling))
 
     # -------------------------------------------------------------------------------- life cycle
 
@@ -234,7 +239,7 @@ class Driver:
     def configure(self, configuration: NodeConfiguration) -> None:
         """Apply changed parameters, of those that apply at once."""
         self.configuration = configuration
-        self._execution.settings = configuration.settings
+        self._execution.settings = self._settings()
 
     @property
     def state(self) -> State | None:
@@ -286,6 +291,7 @@ class Driver:
             raise GoalRefused(f"no connection: {self.link_error}")
         last_stop = self._stop
         goal = goal.renamed(self.configuration.own)
+        self._execution.settings = self._settings()  # the speed limit may have changed
         # what is malformed must not end another motion
         check_form(goal, self.configuration.joints, self._execution.settings.rules)
         try:
