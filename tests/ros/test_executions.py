@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from heptarm.errors import CommandRejected, NotReady
+from heptarm.errors import CommandRejected, MotionAborted, NotReady
 from heptarm.ros.node.driver import Driver
 from heptarm.ros.node.parameters import NodeConfiguration
 from heptarm.ros.trajectory.goal import (
@@ -282,6 +282,33 @@ def test_a_goal_above_the_speed_limit_of_the_arm_is_refused_whenever_that_was_se
         driver.accept(fast)
     driver.arm.speed = 1.0
     assert driver.cancel(driver.accept(fast))
+
+
+@pytest.mark.parametrize("execution", ["servo"], indirect=True)
+def test_a_goal_ends_programs_that_run_and_wait(driver: Driver, recorder: Recorder) -> None:
+    running = driver.start(ptp(HOME + 0.5, speed=0.1), speed=0.1)
+    short = driver.start(ptp(HOME + 0.45), when="queue")
+    waiting = driver.start(ptp(HOME), when="queue")
+    short.cancel()  # the newest one that is not done is not the one that runs
+    waiting.cancel()
+    assert short.wait().cause is waiting.wait().cause is Cause.CANCELLED
+    assert not running.done
+    now = driver.arm.state.q_cmd
+    driver.accept(goal(driver, 0.2 * AWAY, start=now))
+    assert running.wait().cause is Cause.CANCELLED
+    recorder.until(lambda: bool(recorder.ends))
+
+
+@pytest.mark.parametrize("execution", ["servo"], indirect=True)
+def test_deactivation_stops_a_program_behind_which_another_one_was_cancelled(driver: Driver) -> None:
+    running = driver.start(ptp(HOME + 0.5, speed=0.1), speed=0.1)
+    waiting = driver.start(ptp(HOME), when="queue")
+    waiting.cancel()
+    waiting.wait()
+    driver.deactivate()
+    driver.arm.wait_for_rest(timeout=PATIENCE)
+    with pytest.raises(MotionAborted, match="stopped"):
+        running.wait(timeout=PATIENCE)
 
 
 @pytest.mark.parametrize("execution", ["servo"], indirect=True)

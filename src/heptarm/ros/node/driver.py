@@ -126,11 +126,10 @@ class Driver:
         self.configuration = configuration
         self._listener = listener
         self._active = False
-        self._handle: MotionHandle | None = None
+        self._handles: list[MotionHandle] = []  # of the programs that run or wait, oldest first
         self._starting = threading.Lock()  # messages and goals come in several threads
-        self._stop = (
-            object()
-        )  # another one with each stop: what was requested before one must not begin after it
+        # another one with each stop and deactivation: what was requested before one must not begin after it
+        self._stop = object()
         self._is_stopping = False  # the motion of a goal that was stopped may still be open
         self._beginning = threading.Lock()  # of goals and tasks; held only for a moment, for `stop` needs it
         self._task: ArmTask | None = None
@@ -212,12 +211,14 @@ class Driver:
 
     def deactivate(self) -> None:
         """Accept nothing more, and bring the arm to rest."""
-        self._active = False
+        self._active, self._stop = False, object()
         self._end_task("the node was deactivated")
         self._execution.abort("the node was deactivated")
         self._stream.close()
         self.fri.close()
-        if self._handle is not None and not self._handle.done:
+        with self._starting:
+            moving = bool(self._unfinished())
+        if moving:
             try:
                 self._arm.stop()
             except HeptarmError as error:
@@ -335,10 +336,16 @@ class Driver:
         self._end_task(reason)
         self._stream.close()
         with self._starting:  # a motion that the cabinet is about to accept runs, too
-            handle = self._handle
-        if handle is not None and not handle.done:
+            handles = self._unfinished()
+        for handle in reversed(handles):  # a waiting one must not begin when the one before it ends
             handle.cancel()
+        if handles:
             self._arm.wait_for_rest(timeout=_REST_TIMEOUT)
+
+    def _unfinished(self) -> list[MotionHandle]:
+        """Programs that run or wait, oldest first; under the lock."""
+        self._handles = [handle for handle in self._handles if not handle.done]
+        return self._handles
 
     def _end_task(self, reason: str) -> None:
         if self._task is not None:
@@ -441,9 +448,8 @@ class Driver:
         condition = self.guard if until is None else until
         with self._starting:
             self._check_not_stopped(last_stop)
-            handle = self._handle = self._arm.start(
-                motion, mode=mode, speed=limit, until=condition, then=then, when=when
-            )
+            handle = self._arm.start(motion, mode=mode, speed=limit, until=condition, then=then, when=when)
+            self._handles = [*self._unfinished(), handle]
         if self._stop is not last_stop:  # the cabinet may have had the stop before the motion
             handle.cancel()
         handle.add_event_callback(lambda event: self._listener.on_event(handle.id, event))
