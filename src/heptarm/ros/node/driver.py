@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib.util
 import logging
 import os
@@ -113,6 +114,7 @@ class Driver:
     Raises:
         ConnectFailed: the cabinet does not answer.
         NotInControl: another client controls the robot.
+        LimitError: the parameter `servo.posture` is outside the limits of the joints.
     """
 
     def __init__(
@@ -136,39 +138,43 @@ class Driver:
         self._results: dict[int, GoalResult] = {}
         self._has_result = threading.Condition()
         _check_simulator(values["target"])
-        self._arm = connect(
-            values["target"] or None,
-            key_file=values["key_file"] or None,
-            state_rate=values["state_rate"],
-            name=_name(),
-            groups=(*GROUPS, "io") if values["publish_signals"] else GROUPS,
-            watchdog=values["watchdog"],
-            datagrams=values["datagrams"],
-            flange=values["flange"] or None,
-        )
-        self._arm.pad.on_key(listener.on_key)
-        self.fri = NodeFriSession(self._arm)
-        self.transforms = Transforms(clock) if values["tf_frames"] else None
-        self.collisions = CollisionReaction(self._arm, notify=self._on_collision, start=self.start)
-        self._last_feedback = (0, 0.0)  # number of its goal, and its time
-        self._execution = self._make_execution()
-        self._stream = TargetStream(
-            self._arm,
-            timeout=values["command_timeout"],
-            options=configuration.servo,
-            shortest=values["servo.min_trajectory_time"],
-            line_speed=values["servo.line_speed"],
-            turn_speed=values["servo.turn_speed"],
-            elbow=values["servo.elbow"],
-            posture=configuration.posture,
-        )
-        self._destinations = DestinationKeeper(
-            self._stream,
-            lambda: self.state,
-            period=values["command_timeout"] / _REPETITIONS,
-            arrived=listener.on_arrival,
-        )
-        self._feed = ReconnectingStates(self._arm, on_state=self._on_state, on_link=listener.on_link)
+        with contextlib.ExitStack() as undo:  # a node tries again, so what fails must not keep control
+            self._arm = connect(
+                values["target"] or None,
+                key_file=values["key_file"] or None,
+                state_rate=values["state_rate"],
+                name=_name(),
+                groups=(*GROUPS, "io") if values["publish_signals"] else GROUPS,
+                watchdog=values["watchdog"],
+                datagrams=values["datagrams"],
+                flange=values["flange"] or None,
+            )
+            undo.callback(self._arm.close)
+            self._stream = TargetStream(
+                self._arm,
+                timeout=values["command_timeout"],
+                options=configuration.servo,
+                shortest=values["servo.min_trajectory_time"],
+                line_speed=values["servo.line_speed"],
+                turn_speed=values["servo.turn_speed"],
+                elbow=values["servo.elbow"],
+                posture=configuration.posture,
+            )
+            self._arm.pad.on_key(listener.on_key)
+            self.fri = NodeFriSession(self._arm)
+            self.transforms = Transforms(clock) if values["tf_frames"] else None
+            self.collisions = CollisionReaction(self._arm, notify=self._on_collision, start=self.start)
+            self._last_feedback = (0, 0.0)  # number of its goal, and its time
+            self._execution = self._make_execution()
+            undo.callback(self._execution.close)
+            self._destinations = DestinationKeeper(
+                self._stream,
+                lambda: self.state,
+                period=values["command_timeout"] / _REPETITIONS,
+                arrived=listener.on_arrival,
+            )
+            self._feed = ReconnectingStates(self._arm, on_state=self._on_state, on_link=listener.on_link)
+            undo.pop_all()
 
     def _make_execution(self) -> Execution:
         """Make the execution that the parameters select."""
