@@ -7,7 +7,6 @@ from typing import Any
 from unittest.mock import MagicMock
 
 from control_msgs.msg import FollowJointTrajectoryGoal
-
 from heptarm_ros1.trajectory import TrajectoryAction
 
 

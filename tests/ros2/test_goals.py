@@ -9,11 +9,11 @@ from unittest.mock import MagicMock
 
 import pytest
 from control_msgs.action import FollowJointTrajectory
+from heptarm_ros2 import trajectory as module
+from heptarm_ros2.trajectory import TrajectoryAction
 from rclpy.action import GoalResponse
 
 from heptarm.ros.trajectory.goal import ErrorCode, GoalOutcome, GoalResult
-from heptarm_ros2 import trajectory as module
-from heptarm_ros2.trajectory import TrajectoryAction
 
 PATIENCE = 10.0
 

@@ -111,7 +111,9 @@ class ActionDispatcher:
             self._places.release()
             if isinstance(error, HeptarmError) or not isinstance(error, Exception):
                 raise
-            _log.exception("beginning a goal")  # a goal that is neither accepted nor refused would wait for ever
+            _log.exception(
+                "beginning a goal"
+            )  # a goal that is neither accepted nor refused would wait for ever
             raise NotReady(f"internal error of the node: {error!r}") from error
         return partial(self._carry_out, action.name, work)
 
