@@ -177,14 +177,15 @@ class JogServo(Servo):
 
     def close(self) -> None:
         """End the motion at rest; raises the error that ended it early. Calling it again has no effect."""
+        if self._closed:
+            return
         self._ending.set()
         thread, self._thread = self._thread, None
         if thread is not None and thread is not threading.current_thread():
             thread.join(_PATIENCE)
         super().close()
-        failure, self._failure = self._failure, None
-        if failure is not None:
-            raise failure
+        if self._failure is not None:
+            raise self._failure
 
     def _run(self) -> None:
         """Send a target in every period."""
