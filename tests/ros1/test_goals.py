@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import importlib
 import threading
 from typing import Any
 from unittest.mock import MagicMock
 
 from control_msgs.msg import FollowJointTrajectoryGoal
-from heptarm_ros1.trajectory import TrajectoryAction
+
+MODULE: Any = importlib.import_module("heptarm_ros1.trajectory")
 
 
 def test_an_error_that_nobody_expects_rejects_the_goal() -> None:
-    action: Any = TrajectoryAction.__new__(TrajectoryAction)
+    action: Any = MODULE.TrajectoryAction.__new__(MODULE.TrajectoryAction)
     action._lock, action._handles = threading.Lock(), {}
     action._driver = MagicMock(now=0.0)
     action._driver.accept.side_effect = ValueError("cannot convert float NaN to integer")

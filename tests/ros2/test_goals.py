@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import threading
 from types import SimpleNamespace
 from typing import Any
@@ -9,12 +10,11 @@ from unittest.mock import MagicMock
 
 import pytest
 from control_msgs.action import FollowJointTrajectory
-from heptarm_ros2 import trajectory as module
-from heptarm_ros2.trajectory import TrajectoryAction
 from rclpy.action import GoalResponse
 
 from heptarm.ros.trajectory.goal import ErrorCode, GoalOutcome, GoalResult
 
+MODULE: Any = importlib.import_module("heptarm_ros2.trajectory")
 PATIENCE = 10.0
 
 
@@ -50,14 +50,13 @@ class Driver:
 def test_a_result_waits_for_no_goal_that_is_being_accepted(
     monkeypatch: pytest.MonkeyPatch, early: bool
 ) -> None:
-    monkeypatch.setattr(module.messages, "action_goal", lambda *_, **__: None)
+    monkeypatch.setattr(MODULE.messages, "action_goal", lambda *_, **__: None)
     driver = Driver()
-    action: Any = TrajectoryAction.__new__(TrajectoryAction)
+    action: Any = MODULE.TrajectoryAction.__new__(MODULE.TrajectoryAction)
     driver.action, driver.early = action, early
     action._driver, action._ros = driver, None
     action._node = SimpleNamespace(executor=None, get_logger=MagicMock())
     action._lock, action._numbers, action._results, action._handles = threading.Lock(), {}, {}, {}
-    action._accepting = threading.Lock()
     assert action._on_goal(FollowJointTrajectory.Goal()) == GoalResponse.ACCEPT
     assert action._results[2].done() == early
     if not early:
