@@ -169,6 +169,40 @@ def test_a_loop_that_hangs_ends_in_a_stop_and_an_error_that_reports_it(arm: ha.A
     assert np.abs(arm.wait_for_rest().dq).max() < 0.01
 
 
+@pytest.mark.parametrize("kind", ["joint", "velocity"])
+def test_closing_again_raises_the_error_of_the_motion_no_second_time(
+    arm: ha.Arm, kind: Literal["joint", "velocity"]
+) -> None:
+    with arm.servo(kind, watchdog=0.06) as sv:
+        if isinstance(sv, ha.JointServo):
+            sv.set(sv.start.q)
+            until = "no target"
+        else:
+            arm.stop()
+            until = "stopped"
+        arm.wait_until(lambda _: not sv.active, timeout=20.0)
+        with pytest.raises(ha.HeptarmError, match=until):
+            sv.close()
+        sv.close()
+    assert not sv.active
+
+
+def test_the_end_of_the_block_ends_a_motion_whose_closing_was_interrupted(
+    arm: ha.Arm, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with arm.servo("joint", watchdog=2.0) as sv:
+        sv.set(sv.start.q)
+        with monkeypatch.context() as patch:
+            patch.setattr(arm.connection, "cancel", interrupted)
+            with pytest.raises(KeyboardInterrupt):
+                sv.close()
+    assert sv.result is not None and sv.result.cause is ha.Cause.CANCELLED
+
+
+def interrupted(handle: object) -> None:
+    raise KeyboardInterrupt
+
+
 def test_an_error_of_the_loop_is_not_hidden_and_the_arm_rests(arm: ha.Arm) -> None:
     with pytest.raises(ZeroDivisionError), arm.servo("joint", watchdog=2.0) as sv:
         sv.set(sv.start.q + 0.3 * A7)

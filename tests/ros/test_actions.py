@@ -54,6 +54,17 @@ def test_an_internal_error_ends_the_goal(caplog: pytest.LogCaptureFixture) -> No
     assert not result.success and "internal error" in result.message
 
 
+def test_an_internal_error_at_the_beginning_refuses_the_goal(caplog: pytest.LogCaptureFixture) -> None:
+    def begin(context: NodeContext, goal: object) -> GoalWork:
+        raise ValueError("cannot convert float NaN to integer")
+
+    actions = dispatcher()
+    for _ in range(2 * MAX_GOALS):
+        with pytest.raises(NotReady, match="internal error of the node: ValueError"):
+            actions.begin(RosAction("~/anything", "heptarm_msgs/Anything", begin), None)
+    assert "ValueError" in caplog.text
+
+
 def test_the_reason_of_a_failure_is_logged_where_the_result_has_no_text(
     caplog: pytest.LogCaptureFixture,
 ) -> None:

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from heptarm.errors import CommandRejected
+from heptarm.errors import CommandRejected, MotionAborted, NotReady
 from heptarm.ros.node.driver import Driver
 from heptarm.ros.node.parameters import NodeConfiguration
 from heptarm.ros.trajectory.goal import (
@@ -224,6 +224,42 @@ def _commanded(driver: Driver, recorder: Recorder) -> None:
     assert recorder.ends[-1].outcome is GoalOutcome.SUCCEEDED, recorder.ends
 
 
+def test_a_stop_ends_a_goal_before_its_start(driver: Driver, recorder: Recorder) -> None:
+    later = replace(goal(driver, duration=1.0), start=driver.now + 2.0)
+    number = driver.accept(later)
+    driver.stop()
+    recorder.until(lambda: bool(recorder.ends))
+    assert (recorder.ends[0].number, recorder.ends[0].outcome) == (number, GoalOutcome.ABORTED)
+    assert recorder.ends[0].text == "stopped"
+    assert later.start is not None
+    time.sleep(max(0.0, later.start + 0.5 - driver.now))
+    assert np.abs(driver.arm.state.q - HOME).max() < 1e-3
+
+
+@pytest.mark.parametrize("execution", ["servo"], indirect=True)
+def test_after_a_stop_messages_that_go_on_do_not_move_the_arm(driver: Driver) -> None:
+    def publish(seconds: float, *, refused: bool) -> float:
+        """Publish velocities of A7; returns how far it moved [rad]."""
+        begin, end = driver.arm.state.q[6], time.monotonic() + seconds
+        count = 0
+        while time.monotonic() < end:
+            try:
+                driver.follow_velocity(np.array([0, 0, 0, 0, 0, 0, 0.3]))
+            except NotReady as error:
+                assert "stopped" in str(error)
+                count += 1
+            time.sleep(0.02)
+        assert bool(count) == refused
+        return float(driver.arm.state.q[6] - begin)
+
+    assert publish(1.0, refused=False) > 0.02
+    driver.stop()
+    publish(1.0, refused=True)  # it brakes
+    assert abs(publish(1.0, refused=True)) < 1e-3
+    time.sleep(0.5)  # longer than command_timeout
+    assert publish(1.0, refused=False) > 0.02
+
+
 @pytest.mark.parametrize("execution", ["servo"], indirect=True)
 def test_a_malformed_goal_leaves_a_command_alone(driver: Driver) -> None:
     handle = driver.start(ptp(HOME + 0.2))
@@ -233,6 +269,46 @@ def test_a_malformed_goal_leaves_a_command_alone(driver: Driver) -> None:
             driver.accept(wrong)
     assert handle.wait().cause is Cause.FINISHED
     assert np.abs(driver.arm.state.q - HOME - 0.2).max() < 0.01
+
+
+@pytest.mark.parametrize("execution", ["servo"], indirect=True)
+def test_a_goal_above_the_speed_limit_of_the_arm_is_refused_whenever_that_was_set(driver: Driver) -> None:
+    fast = goal(driver)
+    driver.arm.speed = 0.05
+    with pytest.raises(GoalRefused, match="speed"):
+        driver.accept(fast)
+    driver.configure(driver.configuration)  # as any live parameter does
+    with pytest.raises(GoalRefused, match="speed"):
+        driver.accept(fast)
+    driver.arm.speed = 1.0
+    assert driver.cancel(driver.accept(fast))
+
+
+@pytest.mark.parametrize("execution", ["servo"], indirect=True)
+def test_a_goal_ends_programs_that_run_and_wait(driver: Driver, recorder: Recorder) -> None:
+    running = driver.start(ptp(HOME + 0.5, speed=0.1), speed=0.1)
+    short = driver.start(ptp(HOME + 0.45), when="queue")
+    waiting = driver.start(ptp(HOME), when="queue")
+    short.cancel()  # the newest one that is not done is not the one that runs
+    waiting.cancel()
+    assert short.wait().cause is waiting.wait().cause is Cause.CANCELLED
+    assert not running.done
+    now = driver.arm.state.q_cmd
+    driver.accept(goal(driver, 0.2 * AWAY, start=now))
+    assert running.wait().cause is Cause.CANCELLED
+    recorder.until(lambda: bool(recorder.ends))
+
+
+@pytest.mark.parametrize("execution", ["servo"], indirect=True)
+def test_deactivation_stops_a_program_behind_which_another_one_was_cancelled(driver: Driver) -> None:
+    running = driver.start(ptp(HOME + 0.5, speed=0.1), speed=0.1)
+    waiting = driver.start(ptp(HOME), when="queue")
+    waiting.cancel()
+    waiting.wait()
+    driver.deactivate()
+    driver.arm.wait_for_rest(timeout=PATIENCE)
+    with pytest.raises(MotionAborted, match="stopped"):
+        running.wait(timeout=PATIENCE)
 
 
 @pytest.mark.parametrize("execution", ["servo"], indirect=True)

@@ -151,6 +151,8 @@ def test_a_message_is_the_motion_that_python_makes(given: SimpleNamespace, wante
         ),
         (message(5), ShapeError, "7 numbers for each point, got 0"),
         (message(1, redundancy=[0.0] * 4), ShapeError, "4 numbers"),
+        (message(0, redundancy=[0.0, nan]), LimitError, r"redundancy\[1\] must be finite"),
+        (message(0, redundancy=[0.0, 2.0, inf]), LimitError, "must be finite"),
         (message(0, near=[0.0] * 7, redundancy=[0.1]), CommandRejected, "both choose"),
     ],
 )

@@ -73,3 +73,13 @@ def test_a_goal_whose_client_fails_leaves_nothing_running() -> None:
     with pytest.raises(ZeroDivisionError):
         wait_for_task(long, client, stale)
     assert long.done and long.end_reason
+
+
+def test_the_reason_is_known_before_another_stop_ends_it() -> None:
+    arm = FakeArm()
+    long = task(arm, arm.move)
+    long.expect_end("stopped")
+    arm.stop()
+    assert long.wait(60.0) and long.end_reason == "stopped"
+    long.expect_end("too late")
+    assert long.end_reason == "stopped"

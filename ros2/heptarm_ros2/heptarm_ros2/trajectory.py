@@ -40,7 +40,6 @@ class TrajectoryAction:
 
     def __init__(self, node: Node, ros: RosAdapter, driver: Driver, names: Sequence[str], group: Any) -> None:
         self._node, self._ros, self._driver, self._group = node, ros, driver, group
-        self._accepting = threading.Lock()  # held while the driver accepts a goal, which may end immediately
         self._lock = threading.Lock()  # for the tables below
         self._numbers: dict[int, int] = {}  # by the goal message, until the server gives its handle
         self._results: dict[int, Future[GoalResult]] = {}
@@ -70,14 +69,17 @@ class TrajectoryAction:
     def _on_goal(self, message: FollowJointTrajectory.Goal) -> GoalResponse:
         try:
             goal = messages.action_goal(self._ros, message, now=lambda: self._driver.now)
-            with self._accepting:
-                number = self._driver.accept(goal)
-                with self._lock:
-                    self._numbers[id(message)] = number
-                    self._results[number] = Future(executor=self._node.executor)
+            number = self._driver.accept(goal)
         except GoalRefused as error:
             self._node.get_logger().warning(f"goal rejected ({error.reason.name}): {error}")
             return GoalResponse.REJECT
+        future: Future[GoalResult] = Future(executor=self._node.executor)
+        with self._lock:
+            self._numbers[id(message)], self._results[number] = number, future
+        # a goal may end before its number is known here; the results of others must not wait for that
+        result = self._driver.result(number, timeout=0.0)
+        if result is not None:
+            future.set_result(result)
         return GoalResponse.ACCEPT
 
     def _on_accepted(self, handle: Any) -> None:
@@ -144,7 +146,7 @@ class TrajectoryAction:
 
     def on_result(self, result: GoalResult) -> None:
         """Log a result and pass it to its client."""
-        with self._accepting, self._lock:
+        with self._lock:
             future = self._results.get(result.number)
         log = self._node.get_logger()
         if result.code is ErrorCode.SUCCESSFUL:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import queue
 import threading
+import traceback
 from collections.abc import Sequence
 from typing import Any
 
@@ -66,6 +67,10 @@ class TrajectoryAction:
         except GoalRefused as error:
             rospy.logwarn(f"goal rejected ({error.reason.name}): {error}")
             handle.set_rejected(_result(error.reason, str(error)), str(error))
+        except Exception as error:  # actionlib would only log it, and the client wait for ever
+            text = f"internal error of the node: {error!r}"
+            rospy.logerr(f"goal rejected: {text}\n{traceback.format_exc()}")
+            handle.set_rejected(_result(ErrorCode.INVALID_GOAL, text), text)
 
     def _on_cancel(self, handle: Any) -> None:
         with self._lock:

@@ -39,7 +39,7 @@ from heptarm.values.state import State
 from heptarm.wire import messages as wire
 
 #: The path stays below the cabinet's own limit of the speed, so that the arm can catch up.
-_BELOW_CEILING = 0.95
+BELOW_CEILING = 0.95
 #: Longest time for which a velocity is integrated at once: a late thread is no reason for a jump [s].
 _LONGEST_STEP = 0.1
 #: The path may be so far ahead of the arm: a distance [rad], and one that grows with the velocity [s]. From half of it
@@ -143,7 +143,7 @@ class JogServo(Servo):
         low, high = robot.q_min + MARGIN, robot.q_max - MARGIN
         self._path = VelocityPath(
             self.start.q,
-            speed=_BELOW_CEILING * limits.speed * robot.dq_max,
+            speed=BELOW_CEILING * limits.speed * robot.dq_max,
             acceleration=limits.acceleration * robot.ddq_max,
             q_min=low if boundary is None else np.maximum(low, boundary.q_min),
             q_max=high if boundary is None else np.minimum(high, boundary.q_max),
@@ -177,14 +177,15 @@ class JogServo(Servo):
 
     def close(self) -> None:
         """End the motion at rest; raises the error that ended it early. Calling it again has no effect."""
+        if self._closed:
+            return
         self._ending.set()
         thread, self._thread = self._thread, None
         if thread is not None and thread is not threading.current_thread():
             thread.join(_PATIENCE)
         super().close()
-        failure, self._failure = self._failure, None
-        if failure is not None:
-            raise failure
+        if self._failure is not None:
+            raise self._failure
 
     def _run(self) -> None:
         """Send a target in every period."""

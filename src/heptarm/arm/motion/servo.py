@@ -526,7 +526,7 @@ class Servo(Block):
         self._clear: ClearTargets | None = None
         self._handle: MotionHandle | None = None
         self._number = 0
-        self._active = False
+        self._active = self._closed = False
         self._start: State | None = None
         self._result: Result | None = None
         self._began = self._due = self._last = 0
@@ -588,13 +588,16 @@ class Servo(Block):
     def close(self) -> None:
         """End the motion at rest; raises the error that ended it early. Calling it again has no effect."""
         handle = self._handle
-        if handle is None or self._result is not None:
+        if handle is None or self._closed:
             return
         self._active = False
         self._connection.leave_block(handle)  # first: the link may fail in what follows
         if not handle.done:
             self._connection.cancel(handle)
-        self._result = handle.wait(timeout=_PATIENCE)
+        try:
+            self._result = handle.wait(timeout=_PATIENCE)
+        finally:
+            self._closed = handle.done  # what was interrupted is tried again at the end of the block
 
     def __repr__(self) -> str:
         """Short form."""
@@ -800,6 +803,8 @@ class TargetServo(Servo):
 
     def close(self) -> None:
         """End the motion at rest; raises the error that ended it early. Calling it again has no effect."""
+        if self._closed:
+            return
         if self._actions is not None:
             self._actions.close()
         self._correct(is_on=False)

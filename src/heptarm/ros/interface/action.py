@@ -107,9 +107,14 @@ class ActionDispatcher:
             raise NotReady(f"{MAX_GOALS} goals are active", hint="wait for one of them, or cancel it")
         try:
             work = action.begin(self._context, goal)
-        except BaseException:
+        except BaseException as error:
             self._places.release()
-            raise
+            if isinstance(error, HeptarmError) or not isinstance(error, Exception):
+                raise
+            _log.exception(
+                "beginning a goal"
+            )  # a goal that is neither accepted nor refused would wait for ever
+            raise NotReady(f"internal error of the node: {error!r}") from error
         return partial(self._carry_out, action.name, work)
 
     def _carry_out(self, name: str, work: GoalWork, client: GoalClient) -> ActionResult:

@@ -322,7 +322,8 @@ def _redundancy(values: Sequence[float]) -> Redundancy:
         raise ShapeError(
             f"redundancy must have E1, Status and Turn, got {len(values)} numbers", parameter="redundancy"
         )
-    return Redundancy(float(values[0]), *(round(value) for value in values[1:]))
+    e1, *bits = finite_entries(np.array(values, dtype=np.float64), "redundancy").tolist()
+    return Redundancy(e1, *map(round, bits))
 
 
 def _joints(values: Sequence[float]) -> float | list[float]:

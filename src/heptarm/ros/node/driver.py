@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import importlib.util
 import logging
 import os
@@ -35,7 +36,8 @@ from heptarm.ros.trajectory.check import check_form
 from heptarm.ros.trajectory.execution import Execution, GoalListener
 from heptarm.ros.trajectory.fri_execution import FriExecution
 from heptarm.ros.trajectory.goal import GoalRefused, GoalResult, TrajectoryGoal, TrajectoryPoint
-from heptarm.ros.trajectory.runner import GoalFeedback
+from heptarm.ros.trajectory.point_stream import is_streamed
+from heptarm.ros.trajectory.runner import ExecutionSettings, GoalFeedback
 from heptarm.ros.trajectory.send_times import PublishInfo
 from heptarm.ros.trajectory.servo_execution import ServoExecution
 from heptarm.ros.trajectory.spline_execution import SplineExecution
@@ -112,6 +114,7 @@ class Driver:
     Raises:
         ConnectFailed: the cabinet does not answer.
         NotInControl: another client controls the robot.
+        LimitError: the parameter `servo.posture` is outside the limits of the joints.
     """
 
     def __init__(
@@ -125,58 +128,71 @@ class Driver:
         self.configuration = configuration
         self._listener = listener
         self._active = False
-        self._handle: MotionHandle | None = None
+        self._handles: list[MotionHandle] = []  # of the programs that run or wait, oldest first
         self._starting = threading.Lock()  # messages and goals come in several threads
+        # another one with each stop and deactivation: what was requested before one must not begin after it
+        self._stop = object()
+        self._is_stopping = False  # the motion of a goal that was stopped may still be open
+        self._beginning = threading.Lock()  # of goals and tasks; held only for a moment, for `stop` needs it
         self._task: ArmTask | None = None
         self._results: dict[int, GoalResult] = {}
         self._has_result = threading.Condition()
         _check_simulator(values["target"])
-        self._arm = connect(
-            values["target"] or None,
-            key_file=values["key_file"] or None,
-            state_rate=values["state_rate"],
-            name=_name(),
-            groups=(*GROUPS, "io") if values["publish_signals"] else GROUPS,
-            watchdog=values["watchdog"],
-            datagrams=values["datagrams"],
-            flange=values["flange"] or None,
-        )
-        self._arm.pad.on_key(listener.on_key)
-        self.fri = NodeFriSession(self._arm)
-        self.transforms = Transforms(clock) if values["tf_frames"] else None
-        self.collisions = CollisionReaction(self._arm, notify=self._on_collision, start=self.start)
-        self._last_feedback = (0, 0.0)  # number of its goal, and its time
-        self._execution = self._make_execution()
-        self._stream = TargetStream(
-            self._arm,
-            timeout=values["command_timeout"],
-            options=configuration.servo,
-            shortest=values["servo.min_trajectory_time"],
-            line_speed=values["servo.line_speed"],
-            turn_speed=values["servo.turn_speed"],
-            elbow=values["servo.elbow"],
-            posture=configuration.posture,
-        )
-        self._destinations = DestinationKeeper(
-            self._stream,
-            lambda: self.state,
-            period=values["command_timeout"] / _REPETITIONS,
-            arrived=listener.on_arrival,
-        )
-        self._feed = ReconnectingStates(self._arm, on_state=self._on_state, on_link=listener.on_link)
+        with contextlib.ExitStack() as undo:  # a node tries again, so what fails must not keep control
+            self._arm = connect(
+                values["target"] or None,
+                key_file=values["key_file"] or None,
+                state_rate=values["state_rate"],
+                name=_name(),
+                groups=(*GROUPS, "io") if values["publish_signals"] else GROUPS,
+                watchdog=values["watchdog"],
+                datagrams=values["datagrams"],
+                flange=values["flange"] or None,
+            )
+            undo.callback(self._arm.close)
+            self._stream = TargetStream(
+                self._arm,
+                timeout=values["command_timeout"],
+                options=configuration.servo,
+                shortest=values["servo.min_trajectory_time"],
+                line_speed=values["servo.line_speed"],
+                turn_speed=values["servo.turn_speed"],
+                elbow=values["servo.elbow"],
+                posture=configuration.posture,
+            )
+            self._arm.pad.on_key(listener.on_key)
+            self.fri = NodeFriSession(self._arm)
+            self.transforms = Transforms(clock) if values["tf_frames"] else None
+            self.collisions = CollisionReaction(self._arm, notify=self._on_collision, start=self.start)
+            self._last_feedback = (0, 0.0)  # number of its goal, and its time
+            self._execution = self._make_execution()
+            undo.callback(self._execution.close)
+            self._destinations = DestinationKeeper(
+                self._stream,
+                lambda: self.state,
+                period=values["command_timeout"] / _REPETITIONS,
+                arrived=listener.on_arrival,
+            )
+            self._feed = ReconnectingStates(self._arm, on_state=self._on_state, on_link=listener.on_link)
+            undo.pop_all()
 
     def _make_execution(self) -> Execution:
         """Make the execution that the parameters select."""
-        config = self.configuration
+        config, settings = self.configuration, self._settings()
         if config.values["execution"] == "spline":
             speed = config.values["servo.speed"]
-            return SplineExecution(self._arm, config.joints, self, speed=speed, settings=config.settings)
+            return SplineExecution(self._arm, config.joints, self, speed=speed, settings=settings)
         if config.values["execution"] == "fri":
-            return FriExecution(self._arm, config.joints, self, options=config.fri, settings=config.settings)
-        settings = config.settings
-        ceiling = min(settings.rules.speed, self._arm.speed)  # a faster goal is refused, not followed late
-        settings = replace(settings, rules=replace(settings.rules, speed=ceiling))
+            return FriExecution(self._arm, config.joints, self, options=config.fri, settings=settings)
         return ServoExecution(self._arm, config.joints, self, options=config.servo, settings=settings)
+
+    def _settings(self) -> ExecutionSettings:
+        """How goals are executed, by the parameters and the present speed limit of the arm."""
+        settings = self.configuration.settings
+        if self.configuration.values["execution"] != "servo":
+            return settings  # a spline takes longer, and the speed limit is none of FRI
+        ceiling = min(settings.rules.speed, self._arm.speed)  # a faster goal is refused, not followed late
+        return replace(settings, rules=replace(settings.rules, speed=ceiling))
 
     # -------------------------------------------------------------------------------- life cycle
 
@@ -201,12 +217,14 @@ class Driver:
 
     def deactivate(self) -> None:
         """Accept nothing more, and bring the arm to rest."""
-        self._active = False
+        self._active, self._stop = False, object()
         self._end_task("the node was deactivated")
         self._execution.abort("the node was deactivated")
         self._stream.close()
         self.fri.close()
-        if self._handle is not None and not self._handle.done:
+        with self._starting:
+            moving = bool(self._unfinished())
+        if moving:
             try:
                 self._arm.stop()
             except HeptarmError as error:
@@ -228,7 +246,7 @@ class Driver:
     def configure(self, configuration: NodeConfiguration) -> None:
         """Apply changed parameters, of those that apply at once."""
         self.configuration = configuration
-        self._execution.settings = configuration.settings
+        self._execution.settings = self._settings()
 
     @property
     def state(self) -> State | None:
@@ -278,16 +296,25 @@ class Driver:
             raise GoalRefused("the node is not active", hint="activate it")
         if self.link_error:
             raise GoalRefused(f"no connection: {self.link_error}")
+        last_stop = self._stop
         goal = goal.renamed(self.configuration.own)
+        self._execution.settings = self._settings()  # the speed limit may have changed
         # what is malformed must not end another motion
         check_form(goal, self.configuration.joints, self._execution.settings.rules)
         try:
+            if is_streamed(goal, self.now):
+                self._stream.admit()
             self._check_ready()
             self._regain_control()
             self._end_motions("preempted by a trajectory")
+            self._wait_for_stop()
+            with self._beginning:
+                self._check_not_stopped(last_stop)
+                return self._execution.accept(goal)
+        except GoalRefused:
+            raise
         except HeptarmError as error:
             raise GoalRefused(str(error)) from error
-        return self._execution.accept(goal)
 
     def run_task(self, name: str, work: Callable[[], object]) -> ArmTask:
         """Run a function that moves the arm several times, after bringing any other motion to rest.
@@ -299,27 +326,51 @@ class Driver:
         Raises:
             HeptarmError: refused; the text gives the reason.
         """
+        last_stop = self._stop
         self._check_active()
         self._check_ready()
         self._execution.abort(f"preempted by {name}")
         self._execution.wait_idle(_REST_TIMEOUT)
         self._end_motions(f"preempted by {name}")
-        self._task = ArmTask(self._arm, name, work)
-        return self._task
+        with self._beginning:
+            self._check_not_stopped(last_stop)
+            self._task = ArmTask(self._arm, name, work)
+            return self._task
 
     def _end_motions(self, reason: str) -> None:
         """Bring to rest what moves the arm besides goals."""
         self._end_task(reason)
         self._stream.close()
         with self._starting:  # a motion that the cabinet is about to accept runs, too
-            handle = self._handle
-        if handle is not None and not handle.done:
+            handles = self._unfinished()
+        for handle in reversed(handles):  # a waiting one must not begin when the one before it ends
             handle.cancel()
+        if handles:
             self._arm.wait_for_rest(timeout=_REST_TIMEOUT)
+
+    def _unfinished(self) -> list[MotionHandle]:
+        """Programs that run or wait, oldest first; under the lock."""
+        self._handles = [handle for handle in self._handles if not handle.done]
+        return self._handles
 
     def _end_task(self, reason: str) -> None:
         if self._task is not None:
             self._task.end(reason)
+
+    def _wait_for_stop(self) -> None:
+        """Wait until a stop has ended the motion of the last goal: a new goal must not begin in that motion."""
+        if self._is_stopping:
+            if not self._execution.wait_idle(_REST_TIMEOUT):
+                raise NotReady(
+                    f"the last goal was stopped, and its motion has not ended within {_REST_TIMEOUT:g} s",
+                    hint="request it again when the arm rests",
+                )
+            self._is_stopping = False
+
+    def _check_not_stopped(self, last_stop: object) -> None:
+        """Refuse what was requested before a stop and would begin after it; `last_stop` is that before the request."""
+        if self._stop is not last_stop:
+            raise NotReady("the arm was stopped meanwhile", hint="request it again")
 
     def at(self, time: float) -> TrajectorySample | None:
         """Evaluate the active goal at a time on the clock of `now` [s]; None: there is none at that time."""
@@ -392,6 +443,7 @@ class Driver:
         Raises:
             HeptarmError: refused; the text gives the reason.
         """
+        last_stop = self._stop
         self._check_active()
         if when == "replace":
             self._end_task("preempted by a command")
@@ -401,9 +453,11 @@ class Driver:
         limit = self.configuration.values["speed"] if speed is None else speed
         condition = self.guard if until is None else until
         with self._starting:
-            handle = self._handle = self._arm.start(
-                motion, mode=mode, speed=limit, until=condition, then=then, when=when
-            )
+            self._check_not_stopped(last_stop)
+            handle = self._arm.start(motion, mode=mode, speed=limit, until=condition, then=then, when=when)
+            self._handles = [*self._unfinished(), handle]
+        if self._stop is not last_stop:  # the cabinet may have had the stop before the motion
+            handle.cancel()
         handle.add_event_callback(lambda event: self._listener.on_event(handle.id, event))
         return handle
 
@@ -517,12 +571,15 @@ class Driver:
         self.accept(TrajectoryGoal(self.configuration.joints, (point,), from_topic=True, sent=sent))
 
     def _prepare_stream(self) -> None:
+        last_stop = self._stop
         self._check_active()
         self._check_no_task()
+        self._stream.admit()  # what is refused must not end a goal
         if not self._stream.active:
             if self._execution.busy:
                 self._execution.abort("preempted by a servo topic")
             self._execution.wait_idle(_REST_TIMEOUT)
+            self._check_not_stopped(last_stop)
 
     def _check_active(self) -> None:
         if not self._active:
@@ -545,14 +602,27 @@ class Driver:
         self._stream.guard = value
 
     def stop(self, kind: Literal["path", "fast", "after_motion"] = "path") -> None:
-        """Stop the arm, see `Arm.stop`. A task counts as one motion: "after_motion" lets it finish.
+        """Stop the arm, see `Arm.stop`, and end what is to move it: goals, also before their start, tasks, streams.
+
+        A stream of messages is followed again after a silence of `command_timeout`. A task counts as one motion:
+        "after_motion" lets it finish, and goals and streams go on.
 
         Raises:
             HeptarmError: the arm cannot be stopped; the text gives the reason.
         """
-        if kind != "after_motion":
+        if kind == "after_motion":
+            self._arm.stop(kind)
+            return
+        self._stop, self._is_stopping = object(), True
+        self._stream.hold_off()
+        if self._task is not None:
+            self._task.expect_end("stopped")
+        try:
+            self._arm.stop(kind)
+        finally:
+            with self._beginning:
+                self._execution.abort("stopped")
             self._end_task("stopped")
-        self._arm.stop(kind)
 
     def _on_collision(self, found: Collision) -> None:
         self._stream.block(str(found))

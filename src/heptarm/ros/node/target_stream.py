@@ -11,6 +11,7 @@ from typing import Any, Literal
 import numpy as np
 
 from heptarm.arm.arm import Arm
+from heptarm.arm.motion.jog import BELOW_CEILING, lag
 from heptarm.arm.motion.servo import JointServo, PoseServo
 from heptarm.errors import HeptarmError, NotReady
 from heptarm.io.clock import RealClock
@@ -94,6 +95,10 @@ class TargetStream:
         self._last = 0
         self._guard: Condition | None = None
         self._blocked = ""  # what ended the last servo motion; setting a guard clears it
+        self._quiet = threading.Lock()  # of `_held_off`; never held while something is sent
+        self._held_off: int | None = (
+            None  # when the last target came after `hold_off` [ns]; None: all are followed
+        )
         self._opened: dict[str, Any] = {}  # how the open servo motion was opened
         self._again: Callable[[], object] | None = None  # sends the newest target again
 
@@ -111,6 +116,36 @@ class TargetStream:
         """Follow no more targets until a guard is set again; does not wait for the lock."""
         self._blocked = reason
 
+    def hold_off(self) -> None:
+        """Follow no targets until none has come for the timeout; does not wait for the lock.
+
+        The sender of a stream goes on after a stop; its next target must not move the arm again.
+        """
+        with self._quiet:
+            self._held_off = self._clock.nanos()
+
+    def admit(self) -> None:
+        """Take note of a target.
+
+        Raises:
+            NotReady: the stream is held off, and there was no silence since.
+        """
+        with self._quiet:
+            now, last = self._clock.nanos(), self._held_off
+            if last is None:
+                return
+            if (now - last) * 1e-9 > self._timeout:
+                self._held_off = None
+                return
+            self._held_off = now
+        raise self._refusal()
+
+    def _refusal(self) -> NotReady:
+        return NotReady(
+            "the arm was stopped, and messages came all the time since",
+            hint=f"publish nothing for {self._timeout:g} s (command_timeout), then begin again",
+        )
+
     @property
     def active(self) -> bool:
         """Whether a servo motion is open."""
@@ -124,6 +159,7 @@ class TargetStream:
             The positions sent, inside the limits of the joints, shape (7,) [rad].
         """
         with self._lock:
+            self.admit()
             target = array(q, 7, "position")
             velocity = None if dq is None else array(dq, 7, "velocity")
             servo = self._joint_servo(limits, shortest=self._shortest if velocity is None else None)
@@ -169,14 +205,15 @@ class TargetStream:
     def _move(self, command_at: Callable[[VelocityPath], Array]) -> None:
         """Move with the joint velocities [rad/s] that a function returns for the path so far."""
         with self._lock:
-            robot, options = self._arm.robot, self._options
+            self.admit()
+            robot, options, connection = self._arm.robot, self._options, self._arm.connection
             before = self._servo
             servo = self._joint_servo()
             now = self._clock.nanos()
             if servo is not before or self._path is None:
                 self._path = VelocityPath(
                     self._arm.state.q if servo is before else servo.start.q,
-                    speed=options.speed * robot.dq_max,
+                    speed=BELOW_CEILING * min(options.speed, self._arm.speed) * robot.dq_max,
                     acceleration=options.acceleration * robot.ddq_max,
                     q_min=robot.q_min + MARGIN,
                     q_max=robot.q_max - MARGIN,
@@ -184,10 +221,13 @@ class TargetStream:
                 )
                 self._task = None
                 self._last = now - round(_FIRST * 1e9)
-            passed = min((now - self._last) * 1e-9, self._timeout)
+            path, rate = self._path, connection.real_time_factor
+            passed = min((now - self._last) * 1e-9, self._timeout) * rate
             self._last = now
-            self._path.advance(command_at(self._path), passed)
-            servo.set(*self._path.target(_AHEAD))
+            dq = command_at(path)
+            behind = lag(path, dq, connection.newest(), now=now, rate=rate)
+            path.advance(dq, passed, [] if behind is None else [behind])
+            servo.set(*path.target(_AHEAD))
             self._again = None
 
     def pose(
@@ -211,12 +251,14 @@ class TargetStream:
         """
         kind: Literal["pose", "lin"] = "lin" if straight else "pose"
         with self._lock:
+            self.admit()
             settings = self._settings_of(kind, limits) | {"moving": moving}
             servo = self._servo
             if not isinstance(servo, PoseServo) or not servo.active or self._opened != settings:
                 self._prepare()
                 servo = self._servo = self._arm.servo(kind, until=self._guard, **settings).__enter__()
                 self._opened = settings
+                self._check_opened()
             sent = servo.set(pose)
             opened = servo
             self._again = lambda: opened.set(pose)
@@ -229,7 +271,7 @@ class TargetStream:
             False: its servo motion has ended, or velocities have replaced it.
         """
         with self._lock:
-            if self._again is None or not self.active:
+            if self._again is None or not self.active or self._held_off is not None:
                 self._again = None
                 return False
             self._again()
@@ -257,6 +299,7 @@ class TargetStream:
             self._prepare()
             servo = self._servo = self._arm.servo("joint", until=self._guard, **settings).__enter__()
             self._opened = settings
+            self._check_opened()
         return servo
 
     def _prepare(self) -> None:
@@ -270,6 +313,16 @@ class TargetStream:
             raise NotReady(
                 f"servo topics are blocked: {self._blocked}", hint="set the guard again, or an empty one"
             )
+
+    def _check_opened(self) -> None:
+        """End a servo motion that has just opened, if a stop came in the meantime: the cabinet may not have seen it.
+
+        Raises:
+            NotReady: a stop came.
+        """
+        if self._held_off is not None:
+            self.close()
+            raise self._refusal()
 
     def _settings_of(self, kind: str, limits: StreamLimits | None) -> dict[str, Any]:
         """Settings of a servo motion: on straight lines ("lin") the limits hold along the path."""

@@ -55,6 +55,15 @@ class ArmTask:
         """Return what the function returned, or raise what it raised."""
         return self._future.result()
 
+    def expect_end(self, reason: str) -> None:
+        """Note why the function ends, before something else stops the arm.
+
+        Args:
+            reason: why.
+        """
+        if not self.done:
+            self.end_reason = self.end_reason or reason
+
     def end(self, reason: str) -> None:
         """End the function early, if it still runs; returns when it has returned and the arm rests.
 
@@ -63,7 +72,7 @@ class ArmTask:
         """
         if self.done:
             return
-        self.end_reason = self.end_reason or reason
+        self.expect_end(reason)
         for _ in range(round(_END_TIMEOUT / _STOP_PERIOD)):
             with (
                 self._ending,

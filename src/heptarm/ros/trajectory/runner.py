@@ -171,6 +171,11 @@ class TrajectoryRunner:
         """Number of the active goal; 0: none."""
         return 0 if self._active is None else self._active.number
 
+    @property
+    def has_results(self) -> bool:
+        """Whether goals ended since the last call of `take_results` or step."""
+        return bool(self._results)
+
     def accept(self, goal: TrajectoryGoal, *, now: float, state: MeasuredJoints) -> int:
         """Accept a goal; it preempts the active one. What belongs to a stream extends its goal.
 

@@ -73,6 +73,7 @@ class _SplineGoal:
     monitor: ToleranceMonitor
     handle: MotionHandle | None = None
     begin: float = 0.0
+    finished: float | None = None  # when its motion ended
     tau: float = 0.0
     commanded: tuple[int, Array] | None = None  # the last stamp and commanded positions
 
@@ -182,7 +183,7 @@ class SplineExecution(ExecutionThread):
     def cancel(self, number: int) -> bool:
         """Cancel a goal; the arm brakes. False: it is not active."""
         with self._changed:
-            if self.goal != number:
+            if self._active is None or self._active.number != number:
                 return False
             self._end(GoalOutcome.CANCELED, ErrorCode.SUCCESSFUL, "cancelled; the arm brakes")
             self._changed.notify_all()
@@ -237,6 +238,8 @@ class SplineExecution(ExecutionThread):
         if active.goal.start is not None and not self._wait_for_start(active, active.goal.start):
             return
         motion = as_spline(active.trajectory, self._arm.robot, self._speed)
+        if self._active is not active:  # it ended while the last one braked, or in the planning
+            return
         active.handle = handle = self._arm.start(motion, speed=1.0, when="queue")
         active.begin = self.now
         while self._active is active and not handle.done:
@@ -249,6 +252,7 @@ class SplineExecution(ExecutionThread):
                 result = handle.wait(timeout=_REST_TIMEOUT)
                 if result.cause is not Cause.FINISHED:
                     self._abort_if_active(active, f"the motion ended: {result.cause.value} {result.text}")
+            active.finished = self.now
         while self._active is active:
             self._judge(active, active.trajectory.end, self._arm.state, moving=False)
             if self._active is active:
@@ -285,9 +289,8 @@ class SplineExecution(ExecutionThread):
         """End the goal if the tolerances say so."""
         measured = measured_state(state)
         self._scaling = measured.scaling
-        overdue = self.now - active.begin - active.trajectory.duration
-        if not moving:  # a spline may take less time than its trajectory
-            overdue = max(overdue, 0.0)
+        # a spline takes longer than its trajectory at a lower speed or after a pause, and is not late for that
+        overdue = -1.0 if active.finished is None else self.now - active.finished
         with self._changed:
             if self._active is active:
                 verdict = active.monitor.judge(

@@ -135,13 +135,17 @@ class StreamedExecution(ExecutionThread):
     # ------------------------------------------------------------------------------------ thread
 
     def _wait(self) -> bool:
-        with self._changed:
-            self._changed.wait_for(lambda: self._closing or self._runner.busy)
-            if self._runner.busy:
-                return True
-            results = self._runner.take_results()
-        self._notify(None, results)
-        return False
+        runner = self._runner
+        while True:
+            with self._changed:
+                # a goal that ended before its motion opened leaves a result, and nothing to execute
+                self._changed.wait_for(lambda: self._closing or runner.busy or runner.has_results)
+                if runner.busy:
+                    return True
+                closing, results = self._closing, runner.take_results()
+            self._notify(None, results)
+            if closing:
+                return False
 
     @abstractmethod
     def _motion(self) -> AbstractContextManager[CommandStream]:
