@@ -41,9 +41,12 @@ final class FakeFaults {
         }
     }
 
-    /** A command: fails while the robot is jammed. */
+    /** A command: takes as long as a getter, and fails while the robot is jammed. */
     void command() {
         failUntil(jammedUntil);
+        if (getterNanos > 0) {
+            sleep(getterNanos);
+        }
     }
 
     private void failUntil(long until) {

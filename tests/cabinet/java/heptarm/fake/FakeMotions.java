@@ -88,6 +88,7 @@ final class FakeMotions implements MotionPort, Runnable {
         String failure = "";
         boolean started;
         boolean cancelled;
+        boolean stopped;
 
         FakeJob(double[] target, double seconds, MotionJob.Listener listener) {
             this.target = target;
@@ -190,8 +191,8 @@ final class FakeMotions implements MotionPort, Runnable {
             if (job == null) {
                 return;
             }
-            if (job.cancelled) {
-                outcome = MotionJob.Outcome.CANCELLED;
+            if (job.cancelled || job.stopped) { // as of a container, whose job knows only whether it was cancelled itself
+                outcome = job.cancelled ? MotionJob.Outcome.CANCELLED : MotionJob.Outcome.DONE;
             } else if (!job.started && safety.isStopped()) {
                 return;
             } else {
@@ -334,7 +335,7 @@ final class FakeMotions implements MotionPort, Runnable {
     public void stop() {
         faults.command();
         synchronized (q) {
-            jobs.forEach(job -> job.cancelled = true);
+            jobs.forEach(job -> job.stopped = true);
         }
     }
 
