@@ -116,6 +116,19 @@ def test_a_silent_controller_loses_control_in_its_watchdog_time(
         assert isinstance(silent.ask(wire.TakeControl()), wire.Accepted)
 
 
+def test_a_method_that_the_cabinet_lacks_does_not_end_the_watch_for_silent_clients(
+    make: Callable[..., FakeCabinet],
+) -> None:
+    cabinet = make()
+    with Peer(cabinet.port, name="observer") as observer, Peer(cabinet.port, name="silent") as silent:
+        silent.take_control(watchdog=1.0)
+        silent.ask(wire.SetOverride(value=0.5))
+        silent.ask(wire.ShowMessage(severity=wire.Severity.INFO, text="lacks safety"))
+        silent.ask(run(ptp(2.5)))
+        assert observer.wait_for(wire.MotionFinished).cause == wire.Cause.LOST
+    assert len(cabinet.errors()) == 1
+
+
 def test_words_that_came_while_the_cabinet_was_held_up_count(make: Callable[..., FakeCabinet]) -> None:
     """A machine that was suspended for longer than the watchdog time does not count its clients as lost."""
     cabinet = make()

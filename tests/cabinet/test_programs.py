@@ -245,12 +245,13 @@ def test_an_exception_of_the_robot_is_an_answer(make: Callable[..., FakeCabinet]
     assert len(cabinet.errors()) == 3
 
 
-def test_readings_that_fail_for_a_while_end_nothing(make: Callable[..., FakeCabinet]) -> None:
+@pytest.mark.parametrize("fault", ["blind", "outdated"])
+def test_readings_that_fail_for_a_while_end_nothing(make: Callable[..., FakeCabinet], fault: str) -> None:
     cabinet = make()
     with Peer(cabinet.port) as peer:
         peer.take_control()
         peer.ask(wire.Subscribe(groups=wire.Groups(63), rate=100.0))
-        peer.ask(wire.ShowMessage(severity=wire.Severity.INFO, text="blind"))
+        peer.ask(wire.ShowMessage(severity=wire.Severity.INFO, text=fault))
         end = finished(peer, peer.ask(run(ptp(0.05))))
         assert end.cause == wire.Cause.FINISHED
         assert math.isnan(end.residual)

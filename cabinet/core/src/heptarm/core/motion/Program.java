@@ -113,7 +113,7 @@ final class Program {
             int index = isFromFirst ? i : all.size() - 1 - i;
             try {
                 all.get(index).cancel();
-            } catch (RuntimeException e) {
+            } catch (Throwable e) { // the others must be cancelled all the same
                 isTaken = false;
                 log.error("cancelling item " + index + " of motion " + id, e);
             }
