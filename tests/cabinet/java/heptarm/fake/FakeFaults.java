@@ -17,6 +17,8 @@ final class FakeFaults {
     private volatile long jammedUntil;
     private volatile long outdatedUntil;
     private volatile boolean lacksSafety;
+    /** Stiffness of A1 with which the newest servo motion began [Nm/rad]. */
+    volatile double stiffness;
 
     FakeFaults(Clock clock, long getterNanos) {
         this.clock = clock;

@@ -24,6 +24,7 @@ import heptarm.wire.FriSessionState;
 import heptarm.wire.HandGuide;
 import heptarm.wire.Hold;
 import heptarm.wire.Item;
+import heptarm.wire.JointImpedance;
 import heptarm.wire.Mode;
 import heptarm.wire.PathReached;
 import heptarm.wire.PathReference;
@@ -299,6 +300,7 @@ final class FakeMotions implements MotionPort, Runnable {
         FakeJob job = new FakeJob(null, SERVO_TIMEOUT, listener);
         job.isServo = true;
         job.isLin = open.engine == ServoEngine.LIN;
+        faults.stiffness = open.mode instanceof JointImpedance impedance ? impedance.stiffness[0] : 0.0;
         return add(job);
     }
 
