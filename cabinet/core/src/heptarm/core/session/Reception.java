@@ -129,10 +129,10 @@ final class Reception {
     private void accept() {
         FailureLog failures = new FailureLog(log);
         while (!closed) {
+            Socket peer = null;
             try {
-                Socket peer = socket.accept();
-                peer.setTcpNoDelay(true);
-                add(new Newcomer(peer, new Handshake(settings.key), frames));
+                peer = socket.accept();
+                welcome(peer);
                 failures.succeeded();
             } catch (IOException e) {
                 if (!closed) {
@@ -141,8 +141,29 @@ final class Reception {
                 }
             } catch (Throwable e) { // the memory is used up, say: whoever comes later needs this thread
                 failures.failed("accepting a connection", e);
-                Threads.pause();
+                if (peer == null) {
+                    Threads.pause();
+                } else {
+                    close(peer);
+                }
             }
+        }
+    }
+
+    /** Take in a connection; one that its peer has reset already is closed at once, since whoever stops the arm may be next. */
+    private void welcome(Socket peer) {
+        try {
+            peer.setTcpNoDelay(true);
+            add(new Newcomer(peer, new Handshake(settings.key), frames));
+        } catch (IOException e) {
+            close(peer);
+        }
+    }
+
+    private static void close(Socket peer) {
+        try {
+            peer.close();
+        } catch (IOException e) { // it is gone either way
         }
     }
 
