@@ -95,6 +95,10 @@ class FakeCabinet:
         """Names of the server's threads."""
         return sorted(self._say("threads").split())
 
+    def revoke_control(self) -> None:
+        """An operator takes control away from the client that has it; returns when its motions have been ended."""
+        self._say("revoke")
+
     def close(self) -> list[str]:
         """Closes the server; returns the names of the threads that are left."""
         left = self._say("close").split()

@@ -189,7 +189,8 @@ def test_a_hold_and_a_servo_motion_have_no_path(cabinet: FakeCabinet) -> None:
         assert isinstance(answer, wire.Rejected) and answer.code == Code.BAD_CONDITION
 
 
-def test_a_robot_that_cannot_be_read_is_stopped(make: Maker) -> None:
+@pytest.mark.parametrize(("fault", "reason"), [("blind", "did not respond"), ("outdated", "a later release")])
+def test_a_robot_that_cannot_be_read_is_stopped(make: Maker, fault: str, reason: str) -> None:
     with controller(make().port) as peer:
         long = wire.Item(
             motion=wire.Hold(duration=20.0),
@@ -197,6 +198,6 @@ def test_a_robot_that_cannot_be_read_is_stopped(make: Maker) -> None:
         )
         number = started(peer, long)
         peer.wait_for(wire.MotionStarted, lambda event: event.id == number)
-        peer.ask(wire.ShowMessage(severity=wire.Severity.INFO, text="blind"))
+        peer.ask(wire.ShowMessage(severity=wire.Severity.INFO, text=fault))
         end = finish(peer, number)
-        assert end.cause is CAUSE.STOPPED and "did not respond" in end.text
+        assert end.cause is CAUSE.STOPPED and reason in end.text

@@ -17,6 +17,8 @@ from tests.cabinet.fake import ROOT, FakeCabinet
 from tests.cabinet.peer import Peer, is_of, ptp, run
 
 Connect = Callable[..., Peer]
+#: A7 of a target whose check by the fake takes 0.6 s [rad].
+CHECKED_SLOWLY = 0.875
 
 
 @pytest.fixture
@@ -114,6 +116,19 @@ def test_a_silent_controller_loses_control_in_its_watchdog_time(
         assert isinstance(silent.ask(wire.TakeControl()), wire.Accepted)
 
 
+def test_a_method_that_the_cabinet_lacks_does_not_end_the_watch_for_silent_clients(
+    make: Callable[..., FakeCabinet],
+) -> None:
+    cabinet = make()
+    with Peer(cabinet.port, name="observer") as observer, Peer(cabinet.port, name="silent") as silent:
+        silent.take_control(watchdog=1.0)
+        silent.ask(wire.SetOverride(value=0.5))
+        silent.ask(wire.ShowMessage(severity=wire.Severity.INFO, text="lacks safety"))
+        silent.ask(run(ptp(2.5)))
+        assert observer.wait_for(wire.MotionFinished).cause == wire.Cause.LOST
+    assert len(cabinet.errors()) == 1
+
+
 def test_words_that_came_while_the_cabinet_was_held_up_count(make: Callable[..., FakeCabinet]) -> None:
     """A machine that was suspended for longer than the watchdog time does not count its clients as lost."""
     cabinet = make()
@@ -177,6 +192,39 @@ def test_heartbeat_goes_both_directions(make: Callable[..., FakeCabinet]) -> Non
         assert peer.wait_for(wire.Goodbye).code == Code.SILENT
         assert 1 <= len(peer.all(wire.Ping)) <= 30
         assert peer.is_closed()
+
+
+def test_a_motion_whose_client_loses_control_while_it_is_checked_ends(
+    make: Callable[..., FakeCabinet],
+) -> None:
+    cabinet = make()
+    with Peer(cabinet.port, name="observer") as observer, Peer(cabinet.port, name="first") as peer:
+        peer.take_control()
+        peer.send(run(ptp(2.0, 0, 0, 0, 0, 0, CHECKED_SLOWLY)), 99)
+        time.sleep(0.1)
+        cabinet.revoke_control()
+        assert observer.wait_for(wire.ControlChanged, lambda event: "revoked" in event.text).session == 0
+        rejected = peer.answer(99)
+        assert isinstance(rejected, wire.Rejected) and rejected.code == Code.NOT_IN_CONTROL
+        end = observer.wait_for(wire.MotionFinished)
+        assert end.cause == wire.Cause.CANCELLED and end.q[0] < 0.5
+        observer.take_control()
+        number = observer.ask(run(ptp(0.1))).id
+        assert observer.wait_for(wire.MotionFinished, is_of(number)).cause == wire.Cause.FINISHED
+
+
+def test_an_fri_session_whose_client_loses_control_while_it_is_checked_is_closed(
+    make: Callable[..., FakeCabinet],
+) -> None:
+    cabinet = make()
+    with Peer(cabinet.port, name="observer") as observer, Peer(cabinet.port, name="first") as peer:
+        peer.take_control()
+        session = wire.FriOpen(host="127.0.0.1", port=2, period=0.005, command=wire.FriCommandMode.MONITOR)
+        peer.send(session, 99)
+        time.sleep(0.1)
+        cabinet.revoke_control()
+        assert peer.answer(99).code == Code.NOT_IN_CONTROL
+        observer.wait_for(wire.FriChanged, lambda event: event.state == wire.FriSessionState.IDLE)
 
 
 def test_control_changes_hands_a_hundred_times(connect: Connect) -> None:

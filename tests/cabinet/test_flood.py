@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import socket
+import struct
 import time
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -63,6 +65,26 @@ def test_the_allow_list_holds_for_a_stop_too(make: Make) -> None:
     with pytest.raises(ConnectFailed, match="allow-list") as error:
         stop(make(allow="10.0.0.1"))
     assert error.value.code == Code.NOT_ALLOWED
+
+
+def test_connections_that_are_reset_at_once_hold_nobody_up(make: Make) -> None:
+    """A port scan from a host that is not on the allow-list delays no one, and leaves no open sockets."""
+    cabinet = make(allow="10.0.0.1", heartbeat=20.0)
+    folder = f"/proc/{cabinet.process.pid}/fd"
+    before = len(os.listdir(folder))
+    began = time.monotonic()
+    for _ in range(200):
+        with socket.create_connection(("127.0.0.1", cabinet.port), timeout=30.0) as scan:
+            scan.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+    with pytest.raises(ConnectFailed, match="allow-list"):  # of the last in the row, so all were accepted
+        stop(cabinet)
+    assert time.monotonic() - began < 5.0
+    assert "not accepted" not in cabinet.log.read_text()
+    deadline = time.monotonic() + 30.0
+    while len(os.listdir(folder)) > before + 10:
+        assert time.monotonic() < deadline
+        time.sleep(0.1)
+    assert cabinet.errors() == []
 
 
 def test_a_hundred_observers_and_always_a_place_to_act(make: Make) -> None:

@@ -245,12 +245,13 @@ def test_an_exception_of_the_robot_is_an_answer(make: Callable[..., FakeCabinet]
     assert len(cabinet.errors()) == 3
 
 
-def test_readings_that_fail_for_a_while_end_nothing(make: Callable[..., FakeCabinet]) -> None:
+@pytest.mark.parametrize("fault", ["blind", "outdated"])
+def test_readings_that_fail_for_a_while_end_nothing(make: Callable[..., FakeCabinet], fault: str) -> None:
     cabinet = make()
     with Peer(cabinet.port) as peer:
         peer.take_control()
         peer.ask(wire.Subscribe(groups=wire.Groups(63), rate=100.0))
-        peer.ask(wire.ShowMessage(severity=wire.Severity.INFO, text="blind"))
+        peer.ask(wire.ShowMessage(severity=wire.Severity.INFO, text=fault))
         end = finished(peer, peer.ask(run(ptp(0.05))))
         assert end.cause == wire.Cause.FINISHED
         assert math.isnan(end.residual)
@@ -277,6 +278,30 @@ def test_control_becomes_free_even_if_the_robot_cannot_be_stopped(make: Callable
         while not isinstance(after.ask(wire.Stop()), wire.Accepted):
             assert time.monotonic() < deadline
         assert finished(after, accepted).cause in (wire.Cause.STOPPED, wire.Cause.LOST)
+
+
+@pytest.mark.parametrize("way", ["stop", "fast", "lost"])
+def test_the_arm_stops_before_what_waits_is_cancelled(make: Callable[..., FakeCabinet], way: str) -> None:
+    """Each cancellation is a call to the robot; a thousand items must not be cancelled before the moving one stops."""
+    cabinet = make(getter=0.01)
+    with Peer(cabinet.port, name="observer") as observer, Peer(cabinet.port, name="controller") as peer:
+        peer.take_control(watchdog=5.0)
+        began = time.monotonic()
+        accepted = peer.ask(run(ptp(2.9), *(ptp(0.1 * (k % 2)) for k in range(200))))
+        peer.wait_for(wire.MotionStarted)
+        behind = peer.ask(run(ptp(0.0)))
+        time.sleep(0.1)  # all of it has been handed over
+        asked = time.monotonic() - began
+        if way == "lost":
+            peer.close()
+        else:
+            observer.send(wire.Stop(kind=wire.StopKind.PATH if way == "stop" else wire.StopKind.FAST), 1)
+        end = finished(observer, accepted)
+        assert end.cause == (wire.Cause.LOST if way == "lost" else wire.Cause.STOPPED)
+        assert end.q[0] < min(asked + 1.0, 2.8), "it moved on while the others were cancelled"
+        assert finished(observer, behind).cause == end.cause
+        assert not observer.all(wire.ItemReached)
+        assert len(observer.all(wire.MotionStarted)) == 1
 
 
 def test_the_end_of_the_server_stops_motion_reports_all_and_leaves_no_thread(

@@ -61,6 +61,20 @@ def test_relaxing_takes_its_time_before_the_end(cabinet: FakeCabinet) -> None:
         assert min(one.duration for one in relaxes) > min(one.duration for one in stays) + 0.15
 
 
+@pytest.mark.parametrize("getter", [0.002, 0.01])
+@pytest.mark.parametrize("reaction", [None, RETREAT], ids=["stays", "retreats"])
+def test_slow_readings_keep_no_motion_from_its_end(
+    make: Maker, getter: float, reaction: wire.Reaction | None
+) -> None:
+    """A getter of a cabinet takes as long as the period of the record of a contact, or longer."""
+    with controller(make(getter=getter).port) as peer:
+        end = finish(peer, started(peer, reacting(1.1, reaction)))
+        assert (end.cause, end.fired) == (CAUSE.CONDITION, 0)
+        assert end.peak_force >= 3.0
+        assert end.q[6] < (0.5 if reaction is None else 0.1)
+        assert finish(peer, started(peer, turn(0.0))).cause is CAUSE.FINISHED
+
+
 @pytest.mark.parametrize("node", [PUSHED, CORE])
 def test_it_retreats_by_what_it_has_passed(cabinet: FakeCabinet, node: wire.ConditionNode) -> None:
     with controller(cabinet.port) as peer:

@@ -76,6 +76,27 @@ def test_a_waiting_order_that_is_cancelled_leaves_its_followers_sound() -> None:
     assert np.abs(plant.snapshot.q - READY).max() <= 1e-4
 
 
+def test_cancellations_of_one_tick_drop_what_they_name_and_nothing_later() -> None:
+    plant, ears = ready(), [Ear() for _ in range(6)]
+    for index, ear in enumerate(ears[:5]):
+        plant.submit(MotionCommand(index + 1, motions.ptp((THERE, READY)[index % 2]), listener=ear))
+    plant.tick()
+    for number in (5, 4, 2):
+        plant.cancel(number)
+    plant.submit(MotionCommand(4, motions.ptp(THERE), listener=ears[5]))
+    plant.tick()
+    assert [ear.causes[-1:] for ear in ears] == [
+        ["started"],
+        ["cancelled"],
+        [],
+        ["cancelled"],
+        ["cancelled"],
+        [],
+    ]
+    run(plant)
+    assert [ear.causes[-1] for ear in ears] == ["done", "cancelled", "done", "cancelled", "cancelled", "done"]
+
+
 def test_an_order_given_while_the_arm_brakes_is_planned_when_it_rests() -> None:
     plant, ear = ready(), Ear()
     plant.submit(MotionCommand(1, motions.ptp(THERE)))

@@ -389,8 +389,8 @@ class Interpolator:
     def advance(self) -> tuple[float, float]:
         """Shift the set-points and compute the next one; returns progress and remaining time."""
         self.catch_up()
-        while (cancellation := self.queue.cancelled()) is not None:
-            self._cancel(cancellation)
+        if cancellations := self.queue.cancelled():
+            self._cancel(cancellations)
         while self._aborts:
             order_id, text = self._aborts.popleft()
             if self.run is not None and order_id in (0, self.order) and not self.run.failure:
@@ -773,12 +773,13 @@ class Interpolator:
     def _braking_axes(self, jerk: float) -> SmartFollower:
         return braking_axes(self._robot, self._command.after, self._command.speed, jerk=jerk)
 
-    def _cancel(self, cancellation: Cancellation) -> None:
-        """Execute a cancellation."""
-        run = self.run
-        if run is not None and cancellation.affects(run.serial, run.command):
-            (self._brake_fast if cancellation.fast else self._brake)(run)
-        self.queue.drop(cancellation)
+    def _cancel(self, cancellations: Sequence[Cancellation]) -> None:
+        """Execute the cancellations of a tick."""
+        for cancellation in cancellations:
+            run = self.run
+            if run is not None and cancellation.affects(run.serial, run.command):
+                (self._brake_fast if cancellation.fast else self._brake)(run)
+        self.queue.drop(cancellations)
 
     def _brake(self, run: RunningMotion) -> None:
         if run.cancelled or run.failure:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -115,17 +115,18 @@ class MotionQueue:
             self._cancel_count += 1
             self._cancels.append(Cancellation(self._serial, order_id, fast))
 
-    def cancelled(self) -> Cancellation | None:
-        """The next cancellation to execute; None: there is none."""
-        return self._cancels.popleft() if self._cancels else None
+    def cancelled(self) -> list[Cancellation]:
+        """The cancellations to execute, in their order."""
+        return [self._cancels.popleft() for _ in range(len(self._cancels))]
 
-    def drop(self, cancellation: Cancellation) -> None:
-        """Drop the waiting commands that are cancelled."""
+    def drop(self, cancellations: Sequence[Cancellation]) -> None:
+        """Drop the waiting commands that are cancelled, in one pass: an application may cancel a thousand at once."""
+        newest = {one.order_id: one.newest for one in cancellations}  # the last of an id is the newest
         dropped: list[MotionCommand] = []
         with self._lock:
             for _ in range(len(self._inbox)):
                 motion = self._inbox.popleft()
-                if cancellation.affects(motion.serial, motion.command):
+                if motion.serial <= max(newest.get(None, 0), newest.get(motion.command.id, 0)):
                     dropped.append(motion.command)
                 else:
                     self._inbox.append(motion._replace(plan=None))

@@ -29,7 +29,10 @@ public final class FakeCabinet {
         System.out.println(server.start());
         BufferedReader in = new BufferedReader(new InputStreamReader(System.in));
         String line = in.readLine();
-        while ("threads".equals(line)) {
+        while ("threads".equals(line) || "revoke".equals(line)) {
+            if ("revoke".equals(line)) {
+                server.revokeControl("revoked by the operator");
+            }
             System.out.println(threads());
             line = in.readLine();
         }

@@ -15,6 +15,10 @@ final class FakeFaults {
     private final Semaphore planned = new Semaphore(0);
     private volatile long blindUntil;
     private volatile long jammedUntil;
+    private volatile long outdatedUntil;
+    private volatile boolean lacksSafety;
+    /** Stiffness of A1 with which the newest servo motion began [Nm/rad]. */
+    volatile double stiffness;
 
     FakeFaults(Clock clock, long getterNanos) {
         this.clock = clock;
@@ -26,6 +30,8 @@ final class FakeFaults {
         switch (text) {
             case "blind" -> blindUntil = clock.nanos() + FAULT_NS;
             case "jammed" -> jammedUntil = clock.nanos() + FAULT_NS;
+            case "outdated" -> outdatedUntil = clock.nanos() + FAULT_NS;
+            case "lacks safety" -> lacksSafety = true;
             case "planned" -> planned.release();
             case "lacking" -> throw new NoClassDefFoundError("com/kuka/Option");
             case "crash" -> throw new IllegalStateException("an error of the cabinet's API");
@@ -33,17 +39,32 @@ final class FakeFaults {
         }
     }
 
-    /** A reading of so many getters: takes their time, and fails while the robot is blind. */
+    /** A reading of so many getters: takes their time, and fails while the robot is blind or its release lacks the method. */
     void read(int getters) {
         failUntil(blindUntil);
+        if (clock.nanos() < outdatedUntil) {
+            throw new NoSuchMethodError("a getter of a later release");
+        }
         if (getterNanos > 0) {
             sleep(getters * getterNanos);
         }
     }
 
-    /** A command: fails while the robot is jammed. */
+    /** A reading of the safety state: fails once if that was ordered. */
+    void readSafety() {
+        if (lacksSafety) {
+            lacksSafety = false;
+            throw new NoSuchMethodError("getSafetyState of a later release");
+        }
+        read(6);
+    }
+
+    /** A command: takes as long as a getter, and fails while the robot is jammed. */
     void command() {
         failUntil(jammedUntil);
+        if (getterNanos > 0) {
+            sleep(getterNanos);
+        }
     }
 
     private void failUntil(long until) {

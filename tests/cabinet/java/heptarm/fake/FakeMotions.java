@@ -24,6 +24,7 @@ import heptarm.wire.FriSessionState;
 import heptarm.wire.HandGuide;
 import heptarm.wire.Hold;
 import heptarm.wire.Item;
+import heptarm.wire.JointImpedance;
 import heptarm.wire.Mode;
 import heptarm.wire.PathReached;
 import heptarm.wire.PathReference;
@@ -38,7 +39,7 @@ import heptarm.wire.Trigger;
  * Seven axes without dynamics: each motion runs at one speed, a cancelled one stops at once.
  *
  * <p>The target of A7 orders failures of a PTP: 1.25 rad fails at planning, 1.5 rad fails during the motion, 1.0 rad is
- * planned until the operator orders "planned", 0.75 rad needs an option that the cabinet lacks. A servo motion jumps to its targets; it refuses more than
+ * planned until the operator orders "planned", 0.75 rad needs an option that the cabinet lacks, the check of 0.875 rad takes 0.6 s. A servo motion jumps to its targets; it refuses more than
  * 2 rad of A7, and ends 0.3 s after the last target. Only the engine lin follows poses, and turns A7 by their x.
  */
 final class FakeMotions implements MotionPort, Runnable {
@@ -47,9 +48,12 @@ final class FakeMotions implements MotionPort, Runnable {
     private static final double FAILS_IN_MOTION = 1.5;
     private static final double PLANS_SLOWLY = 1.0;
     private static final double LACKS_A_CLASS = 0.75;
+    private static final double CHECKED_SLOWLY = 0.875;
+    private static final long CHECK_NS = 600000000L;
     private static final double REFUSED_TARGET = 2.0;
     private static final double SERVO_TIMEOUT = 0.3;
     private static final int TAKEN_PORT = 1;
+    private static final int SLOW_PORT = 2;
     private static final double NEVER_ANSWERS = 0.1;
     private static final double FAILS_COMMANDING = 0.009;
     private static final double ENDLESS = 1e9;
@@ -88,6 +92,7 @@ final class FakeMotions implements MotionPort, Runnable {
         String failure = "";
         boolean started;
         boolean cancelled;
+        boolean stopped;
 
         FakeJob(double[] target, double seconds, MotionJob.Listener listener) {
             this.target = target;
@@ -190,8 +195,8 @@ final class FakeMotions implements MotionPort, Runnable {
             if (job == null) {
                 return;
             }
-            if (job.cancelled) {
-                outcome = MotionJob.Outcome.CANCELLED;
+            if (job.cancelled || job.stopped) { // as of a container, whose job knows only whether it was cancelled itself
+                outcome = job.cancelled ? MotionJob.Outcome.CANCELLED : MotionJob.Outcome.DONE;
             } else if (!job.started && safety.isStopped()) {
                 return;
             } else {
@@ -239,6 +244,9 @@ final class FakeMotions implements MotionPort, Runnable {
                 || item.motion instanceof HandGuide)) {
             throw new CommandRejected(Code.UNSUPPORTED, path + "motion", item.motion.getClass().getSimpleName(), "Ptp, Hold, HandGuide",
                     "not here");
+        }
+        if (item.motion instanceof Ptp ptp && ptp.q[6] == CHECKED_SLOWLY) {
+            faults.sleep(CHECK_NS);
         }
     }
 
@@ -292,6 +300,7 @@ final class FakeMotions implements MotionPort, Runnable {
         FakeJob job = new FakeJob(null, SERVO_TIMEOUT, listener);
         job.isServo = true;
         job.isLin = open.engine == ServoEngine.LIN;
+        faults.stiffness = open.mode instanceof JointImpedance impedance ? impedance.stiffness[0] : 0.0;
         return add(job);
     }
 
@@ -300,9 +309,12 @@ final class FakeMotions implements MotionPort, Runnable {
         if (open.command == FriCommandMode.POSE) {
             throw new CommandRejected(Code.UNSUPPORTED, "command", "pose", "", "not here");
         }
+        if (open.port == SLOW_PORT) {
+            faults.sleep(CHECK_NS);
+        }
     }
 
-    /** Its client answers after ten times the period, unless that is 0.1 s; a commanding one of 9 ms fails soon. */
+    /** The check of port 2 takes 0.6 s. Its client answers after ten times the period, unless that is 0.1 s; a commanding one of 9 ms fails soon. */
     @Override
     public FriSession openFri(FriOpen open, FriSession.Listener listener) throws CommandRejected {
         if (open.port == TAKEN_PORT) {
@@ -334,7 +346,7 @@ final class FakeMotions implements MotionPort, Runnable {
     public void stop() {
         faults.command();
         synchronized (q) {
-            jobs.forEach(job -> job.cancelled = true);
+            jobs.forEach(job -> job.stopped = true);
         }
     }
 

@@ -36,6 +36,9 @@ final class FakePanel implements PanelPort {
         if ("keyed".equals(name)) {
             return keyed;
         }
+        if ("servo".equals(name)) {
+            return Double.toString(faults.stiffness);
+        }
         if (!"speed".equals(name)) {
             throw new CommandRejected(Code.UNKNOWN_NAME, "name", name, "", "no process data " + name);
         }

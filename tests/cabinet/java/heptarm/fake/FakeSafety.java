@@ -22,7 +22,7 @@ final class FakeSafety implements SafetyPort {
 
     @Override
     public SafetyState read(long stamp) {
-        faults.read(6);
+        faults.readSafety();
         int all = bits | SafetyBits.MASTERED | (paused ? SafetyBits.PAUSED : 0);
         return new SafetyState(stamp, isStopped() ? all : all | SafetyBits.READY_TO_MOVE, mode);
     }

@@ -85,7 +85,7 @@ public final class ConditionWatcher {
                             program.end(Cause.CONDITION, "");
                             return;
                         }
-                    } catch (RuntimeException e) {
+                    } catch (Throwable e) { // also a method that this cabinet lacks: without its condition the motion must not go on
                         if (++failures == MAX_FAILURES) {
                             log.error("evaluating a break condition", e);
                             program.end(Cause.STOPPED, "its break condition cannot be evaluated: " + e.getMessage());

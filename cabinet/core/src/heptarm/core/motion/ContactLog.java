@@ -35,6 +35,8 @@ final class ContactLog {
     private boolean isTouching;
     private boolean hasFailed;
     private long due;
+    /** Cabinet time of the newest force [ns]. */
+    private long read;
     private double peak = Double.NaN;
     private double rest = Double.NaN;
 
@@ -105,7 +107,7 @@ final class ContactLog {
         record();
     }
 
-    /** Record what is due. */
+    /** Record what is due when it is called: a reading of a cabinet takes a period or longer, and is of the present, so one is enough. */
     void record() {
         long now = clock.nanos();
         if (!isTouching) {
@@ -116,10 +118,10 @@ final class ContactLog {
             return;
         }
         due = Math.max(due, now - LATE_NS);
-        while (due <= clock.nanos()) {
+        while (due <= now) {
             double force = force(due);
             peak = peak >= force ? peak : force;
-            due += FORCE_NS;
+            due = Math.max(due, read) + FORCE_NS;
         }
     }
 
@@ -195,7 +197,8 @@ final class ContactLog {
     private double force(long time) {
         clock.hold(time);
         try {
-            double[] force = sensors.readWrench(clock.stamp()).force;
+            read = clock.stamp();
+            double[] force = sensors.readWrench(read).force;
             return Math.sqrt(force[0] * force[0] + force[1] * force[1] + force[2] * force[2]);
         } catch (RuntimeException e) {
             failed(e);

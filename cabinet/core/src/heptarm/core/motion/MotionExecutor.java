@@ -40,7 +40,8 @@ import heptarm.wire.When;
  * stop may still take the place of that cause: until {@link Program#settle} it is not the final one.
  *
  * <p><b>The end is asked for, then awaited.</b> {@link Program#end} notes the cause and cancels the robot's jobs, from the last
- * to the first so that none starts meanwhile. It does not wait. The motion thread waits until the robot has reported the end of
+ * to the first so that none starts meanwhile. A stop notes the cause of all programs, stops the robot, and cancels the jobs after
+ * that. Neither waits. The motion thread waits until the robot has reported the end of
  * each item, so the next program starts from an arm at rest, and "finished" is reported once and last. A program that never ran
  * is reported by the request that ended it. After a failure the waiting programs are dropped: the robot is not where they should start.
  *
@@ -242,13 +243,32 @@ public final class MotionExecutor implements SafetyMonitor.Listener, MotionStatu
             return !waiting.isEmpty();
         }
         List<Program> ended = take(0);
-        end(ended, Cause.STOPPED, why);
-        if (kind == StopKind.FAST) {
-            port.stopFast();
-        } else {
-            port.stop();
-        }
+        halt(ended, Cause.STOPPED, why, kind == StopKind.FAST);
         return !ended.isEmpty();
+    }
+
+    /** End all motions by a stop of the arm. */
+    public void stopAll(Cause cause, String why) {
+        halt(take(0), cause, why, false);
+    }
+
+    /** The stop comes before anything is cancelled: each cancellation is a call to the robot, and there may be a thousand. */
+    private void halt(List<Program> programs, Cause cause, String why, boolean isFast) {
+        for (Program program : programs) {
+            program.halt(cause, why);
+        }
+        try {
+            if (isFast) {
+                port.stopFast();
+            } else {
+                port.stop();
+            }
+        } finally {
+            for (Program program : programs) {
+                program.cancel(true);
+                reportUnmoved(program);
+            }
+        }
     }
 
     public void endAll(Cause cause, String why) {
@@ -306,13 +326,18 @@ public final class MotionExecutor implements SafetyMonitor.Listener, MotionStatu
     private void end(List<Program> programs, Cause cause, int code, String why) {
         for (Program program : programs) {
             program.end(cause, code, why);
-            boolean waiting;
-            synchronized (this) {
-                waiting = program != running;
-            }
-            if (waiting && program.began == 0) {
-                reporter.finished(program, false);
-            }
+            reportUnmoved(program);
+        }
+    }
+
+    /** Report the end of a program that has not begun; the motion thread reports the others. */
+    private void reportUnmoved(Program program) {
+        boolean waiting;
+        synchronized (this) {
+            waiting = program != running;
+        }
+        if (waiting && program.began == 0) {
+            reporter.finished(program, false);
         }
     }
 
@@ -325,7 +350,11 @@ public final class MotionExecutor implements SafetyMonitor.Listener, MotionStatu
             closed = true;
             notifyAll();
         }
-        endAll(Cause.STOPPED, "the cabinet application is closing");
+        try {
+            stopAll(Cause.STOPPED, "the cabinet application is closing");
+        } catch (RuntimeException e) { // the thread ends all the same
+            log.error("stopping the robot", e);
+        }
         Threads.join(thread);
     }
 
@@ -406,10 +435,11 @@ public final class MotionExecutor implements SafetyMonitor.Listener, MotionStatu
                 watch(program, i);
             }
         }
+        boolean isCancelled = false;
         for (int i = 0; i < program.outcomes.length; i++) {
             program.await(i);
-            if (program.cause() != null) {
-                program.end(program.cause, program.why);
+            if (program.cause() != null && !isCancelled) { // once: each item would cancel all the others
+                isCancelled = program.cancel(false);
             }
         }
     }

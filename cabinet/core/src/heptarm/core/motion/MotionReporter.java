@@ -40,7 +40,7 @@ public final class MotionReporter {
         try {
             State now = reader.read(Groups.JOINTS | Groups.TORQUES | Groups.POSE | Groups.WRENCH);
             events.publish(new ConditionFired(id, item, node, now.joints, now.torques, now.pose, now.wrench));
-        } catch (RuntimeException e) { // the end is reported in any case
+        } catch (Throwable e) { // the end is reported in any case
             log.error("reading the robot when a condition of motion " + id + " fired", e);
         }
     }
@@ -50,7 +50,7 @@ public final class MotionReporter {
         JointState joints = null;
         try {
             joints = reader.joints();
-        } catch (RuntimeException e) {
+        } catch (Throwable e) {
             log.error("reading the joints when a trigger of motion " + id + " fired", e);
         }
         events.publish(new TriggerFired(id, item, trigger, label, time, joints, code, text));
@@ -66,7 +66,7 @@ public final class MotionReporter {
             for (int i = 0; moved && i < JOINTS; i++) {
                 residual = Math.max(residual, Math.abs(q[i] - last.q_cmd[i]));
             }
-        } catch (RuntimeException e) {
+        } catch (Throwable e) {
             log.error("reading the joints at the end of motion " + program.id, e);
             Arrays.fill(q, Double.NaN);
             residual = Double.NaN;

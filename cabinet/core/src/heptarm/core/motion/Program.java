@@ -35,6 +35,8 @@ final class Program {
     private boolean isFiringReported;
     /** Whether a break condition is the final cause of the end; while the arm reacts to it, something else may end the program. */
     private boolean isSettled = true;
+    /** Whether the whole robot was stopped; a job that this ended counts as cancelled. */
+    private boolean isHalted;
     private MotionJob.Outcome reacted;
     private final MotionReporter reporter;
     private final TriggerActions triggers;
@@ -69,26 +71,54 @@ final class Program {
     }
 
     void end(Cause newCause, int newCode, String newWhy) {
-        List<MotionJob> all;
+        mark(newCause, newCode, newWhy);
+        cancel(false);
+    }
+
+    /** Note that a stop of the whole robot ends the program; {@link #cancel} must follow. */
+    void halt(Cause newCause, String newWhy) {
+        synchronized (this) {
+            isHalted = true;
+        }
+        mark(newCause, 0, newWhy);
+    }
+
+    private void mark(Cause newCause, int newCode, String newWhy) {
         synchronized (this) {
             if (cause == null || isReacting()) {
                 cause = newCause;
                 code = newCode;
                 why = newWhy;
             }
-            all = new ArrayList<MotionJob>(jobs);
             notifyAll();
         }
         if (activity != null) {
             activity.close();
         }
-        for (int i = all.size() - 1; i >= 0; i--) {
+    }
+
+    /**
+     * Cancel what was handed to the robot.
+     *
+     * @param isFromFirst the running one first, after a stop; otherwise from the last, so that none starts while the others are cancelled
+     * @return whether the robot has taken all of it
+     */
+    boolean cancel(boolean isFromFirst) {
+        List<MotionJob> all;
+        synchronized (this) {
+            all = new ArrayList<MotionJob>(jobs);
+        }
+        boolean isTaken = true;
+        for (int i = 0; i < all.size(); i++) {
+            int index = isFromFirst ? i : all.size() - 1 - i;
             try {
-                all.get(i).cancel(); // from the last, so that none starts while the others are cancelled
-            } catch (RuntimeException e) {
-                log.error("cancelling item " + i + " of motion " + id, e);
+                all.get(index).cancel();
+            } catch (Throwable e) { // the others must be cancelled all the same
+                isTaken = false;
+                log.error("cancelling item " + index + " of motion " + id, e);
             }
         }
+        return isTaken;
     }
 
     private boolean isReacting() {
@@ -235,6 +265,11 @@ final class Program {
         isSettled = true;
     }
 
+    /** A job that was not cancelled itself does not know that the robot was stopped. */
+    private synchronized MotionJob.Outcome orCancelled(MotionJob.Outcome how) {
+        return isHalted && how == MotionJob.Outcome.DONE ? MotionJob.Outcome.CANCELLED : how;
+    }
+
     MotionJob.Listener reactionListener() {
         return new MotionJob.Listener() {
             public void started() {
@@ -295,7 +330,8 @@ final class Program {
                 Program.this.fired(index, node);
             }
 
-            public void finished(MotionJob.Outcome outcome, int failureCode, String failure) {
+            public void finished(MotionJob.Outcome how, int failureCode, String failure) {
+                MotionJob.Outcome outcome = orCancelled(how);
                 if (outcome == MotionJob.Outcome.FAILED) {
                     fail(index, failureCode, failure);
                 } else {

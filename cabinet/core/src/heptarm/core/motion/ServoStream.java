@@ -197,7 +197,7 @@ public final class ServoStream implements Activity {
             prepare();
             program.restart(0);
             try {
-                ServoJob next = port.openServo(open, program.listener(0));
+                ServoJob next = port.openServo(present(), program.listener(0));
                 adopt(next);
                 program.adopt(next);
                 if (awaitStart()) {
@@ -216,6 +216,12 @@ public final class ServoStream implements Activity {
                 goesOn = false;
             }
         }
+    }
+
+    /** What the client opened, in the mode that it has changed to since: a motion that starts again must not be stiffer than that. */
+    private ServoOpen present() {
+        return new ServoOpen(open.engine, open.frame, mode(), open.velocity, open.acceleration, open.linear, open.timing, open.watchdog,
+                open.until);
     }
 
     private synchronized void adopt(ServoJob next) {

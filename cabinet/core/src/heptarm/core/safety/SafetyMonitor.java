@@ -112,7 +112,7 @@ public final class SafetyMonitor implements Watchdog.Check {
     public boolean isStopped() {
         try {
             return update().isStop();
-        } catch (RuntimeException e) { // a motion that fails must end, also if the state cannot be read
+        } catch (Throwable e) { // a motion that fails must end, also if the state cannot be read
             synchronized (this) {
                 return seen != null && seen.isStop();
             }

@@ -5,6 +5,7 @@ import java.util.concurrent.CopyOnWriteArrayList;
 import java.util.concurrent.locks.LockSupport;
 
 import heptarm.core.Clock;
+import heptarm.core.FailureLog;
 import heptarm.core.Log;
 import heptarm.core.Threads;
 
@@ -38,13 +39,14 @@ public final class Watchdog {
         final String name;
         final int rounds;
         final Check check;
+        final FailureLog failures;
         int waited;
-        boolean failing;
 
-        Entry(String name, int rounds, Check check) {
+        Entry(String name, int rounds, Check check, Log log) {
             this.name = name;
             this.rounds = rounds;
             this.check = check;
+            this.failures = new FailureLog(log);
         }
     }
 
@@ -55,7 +57,7 @@ public final class Watchdog {
 
     /** Add a check that runs every few periods; the name appears in the log. */
     public void add(String name, int rounds, Check check) {
-        entries.add(new Entry(name, rounds, check));
+        entries.add(new Entry(name, rounds, check, log));
     }
 
     public void start() {
@@ -104,12 +106,9 @@ public final class Watchdog {
     private void run(Entry one) {
         try {
             one.check.check();
-            one.failing = false;
-        } catch (RuntimeException e) {
-            if (!one.failing) { // once per failure: a cabinet's log is slow
-                log.error("checking " + one.name, e);
-            }
-            one.failing = true;
+            one.failures.succeeded();
+        } catch (Throwable e) { // also a method that this cabinet lacks: the other checks need this thread
+            one.failures.failed("checking " + one.name, e);
         }
     }
 }

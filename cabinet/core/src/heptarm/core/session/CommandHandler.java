@@ -135,6 +135,23 @@ public final class CommandHandler {
         return new Accepted(id);
     }
 
+    /** Whether a command begins something that goes on after its answer. */
+    static boolean begins(Message message) {
+        return message instanceof Run || message instanceof ServoOpen || message instanceof FriOpen;
+    }
+
+    /** End what a command has begun. */
+    void withdraw(Message message, long id) {
+        try {
+            if (message instanceof FriOpen) {
+                close(new FriClose(id));
+            } else {
+                executor.cancel(id);
+            }
+        } catch (CommandRejected e) { // it has ended already
+        }
+    }
+
     private ServoStream runningServo(long id) throws CommandRejected {
         ServoStream servo = executor.servo(id);
         if (servo == null) {

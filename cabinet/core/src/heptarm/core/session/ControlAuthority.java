@@ -148,8 +148,7 @@ public final class ControlAuthority {
         log.warn(client.name() + " lost control: " + why);
         try {
             if (action == OnLost.STOP) {
-                executor.endAll(Cause.LOST, client.name() + " was lost: " + why);
-                port.stop();
+                executor.stopAll(Cause.LOST, client.name() + " was lost: " + why);
             }
             monitors.closeAll();
         } catch (RuntimeException e) {

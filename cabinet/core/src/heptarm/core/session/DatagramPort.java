@@ -8,6 +8,7 @@ import java.net.InetSocketAddress;
 import java.util.Map;
 import java.util.concurrent.ConcurrentHashMap;
 
+import heptarm.core.FailureLog;
 import heptarm.core.Log;
 import heptarm.core.Threads;
 import heptarm.wire.Protocol;
@@ -87,6 +88,7 @@ final class DatagramPort {
     private void receive() {
         byte[] data = new byte[BUFFER];
         DatagramPacket packet = new DatagramPacket(data, data.length);
+        FailureLog failures = new FailureLog(log);
         boolean failing = false;
         while (!closed) {
             try {
@@ -94,6 +96,7 @@ final class DatagramPort {
                 socket.receive(packet);
                 pass(data, packet.getLength(), packet.getAddress(), packet.getPort());
                 failing = false;
+                failures.succeeded();
             } catch (IOException e) {
                 if (!closed) {
                     if (!failing) {
@@ -102,11 +105,8 @@ final class DatagramPort {
                     failing = true;
                     Threads.pause();
                 }
-            } catch (RuntimeException e) {
-                if (!failing) { // once: nobody may fill a cabinet's log
-                    log.error("handling a datagram", e);
-                }
-                failing = true;
+            } catch (Throwable e) {
+                failures.failed("handling a datagram", e);
             }
         }
     }

@@ -8,6 +8,7 @@ import java.net.Socket;
 import java.util.ArrayList;
 import java.util.List;
 
+import heptarm.core.FailureLog;
 import heptarm.core.Log;
 import heptarm.core.Threads;
 import heptarm.wire.Code;
@@ -126,19 +127,43 @@ final class Reception {
     // ------------------------------------------------------------------------------------------- accepting
 
     private void accept() {
+        FailureLog failures = new FailureLog(log);
         while (!closed) {
+            Socket peer = null;
             try {
-                Socket peer = socket.accept();
-                peer.setTcpNoDelay(true);
-                add(new Newcomer(peer, new Handshake(settings.key), frames));
+                peer = socket.accept();
+                welcome(peer);
+                failures.succeeded();
             } catch (IOException e) {
                 if (!closed) {
                     log.warn("a connection was not accepted: " + e);
                     Threads.pause(); // a cause such as too many open files does not vanish at once
                 }
-            } catch (RuntimeException e) {
-                log.error("accepting a connection", e);
+            } catch (Throwable e) { // the memory is used up, say: whoever comes later needs this thread
+                failures.failed("accepting a connection", e);
+                if (peer == null) {
+                    Threads.pause();
+                } else {
+                    close(peer);
+                }
             }
+        }
+    }
+
+    /** Take in a connection; one that its peer has reset already is closed at once, since whoever stops the arm may be next. */
+    private void welcome(Socket peer) {
+        try {
+            peer.setTcpNoDelay(true);
+            add(new Newcomer(peer, new Handshake(settings.key), frames));
+        } catch (IOException e) {
+            close(peer);
+        }
+    }
+
+    private static void close(Socket peer) {
+        try {
+            peer.close();
+        } catch (IOException e) { // it is gone either way
         }
     }
 
@@ -182,6 +207,7 @@ final class Reception {
     private void receive() {
         List<Newcomer> all = new ArrayList<Newcomer>();
         List<Newcomer> gone = new ArrayList<Newcomer>();
+        FailureLog failures = new FailureLog(log);
         try {
             while (!closed) {
                 all.clear();
@@ -194,13 +220,18 @@ final class Reception {
                     gone.addAll(displaced);
                     displaced.clear();
                 }
-                for (Newcomer one : gone) {
-                    displace(one);
+                try {
+                    for (Newcomer one : gone) {
+                        displace(one);
+                    }
+                    for (Newcomer one : all) {
+                        serve(one);
+                    }
+                    answerHalted();
+                    failures.succeeded();
+                } catch (Throwable e) { // the memory is used up, say: who comes later needs this thread
+                    failures.failed("serving connections without a session", e);
                 }
-                for (Newcomer one : all) {
-                    serve(one);
-                }
-                answerHalted();
                 Thread.sleep(POLL_MS);
             }
         } catch (InterruptedException e) {
@@ -242,9 +273,9 @@ final class Reception {
             }
         } catch (IOException e) {
             drop(one);
-        } catch (RuntimeException e) {
-            log.error("receiving " + one.address, e);
+        } catch (Throwable e) { // also a class that this cabinet lacks
             drop(one);
+            log.error("receiving " + one.address, e);
         }
     }
 
@@ -263,6 +294,7 @@ final class Reception {
 
     private void halt() {
         List<Newcomer> all = new ArrayList<Newcomer>();
+        FailureLog failures = new FailureLog(log);
         try {
             while (!closed) {
                 all.clear();
@@ -273,7 +305,12 @@ final class Reception {
                     all.addAll(halting);
                     halting.clear();
                 }
-                halt(all);
+                try {
+                    halt(all);
+                    failures.succeeded();
+                } catch (Throwable e) { // the next stop needs this thread
+                    failures.failed("answering a stop", e);
+                }
             }
         } catch (InterruptedException e) {
             Thread.currentThread().interrupt();
@@ -292,11 +329,11 @@ final class Reception {
             }
             try {
                 host.halt(kind, who);
-            } catch (RuntimeException e) {
-                log.error("stopping the robot for " + who, e);
+            } catch (Throwable e) { // also a class that this cabinet lacks
                 for (Newcomer one : all) {
                     one.failure = String.valueOf(e);
                 }
+                log.error("stopping the robot for " + who, e);
             }
         }
         synchronized (halting) {

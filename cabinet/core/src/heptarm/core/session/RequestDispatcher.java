@@ -62,12 +62,7 @@ final class RequestDispatcher {
                 return;
             }
             if (Messages.needsControl(type) && !authority.isController(client)) {
-                String controller = authority.name();
-                throw new CommandRejected(Code.NOT_IN_CONTROL, "controller", controller, "",
-                        controller.length() == 0 ? "nobody controls the robot"
-                                : controller.equals(client.name()) ? "another client named " + controller
-                                        + " controls the robot; give each client a name of its own"
-                                : controller + " controls the robot, not " + client.name());
+                throw notInControl(client);
             }
             if (CommandHandler.isTarget(type)) {
                 commands.stream(message, sent, request);
@@ -136,9 +131,31 @@ final class RequestDispatcher {
         } else if (message instanceof GetDatagramStatistics) {
             return client.datagrams.counts();
         } else {
-            return commands.answer(message);
+            return command(client, message);
         }
         return new Accepted(0);
+    }
+
+    /**
+     * Execute a command. Its checks take a while, in which the client may lose control; what ended its motions has not seen this one
+     * then, so it ends here.
+     */
+    private Message command(ClientConnection client, Message message) throws CommandRejected {
+        Message answer = commands.answer(message);
+        if (CommandHandler.begins(message) && !authority.isController(client)) {
+            commands.withdraw(message, ((Accepted) answer).id);
+            throw notInControl(client);
+        }
+        return answer;
+    }
+
+    private CommandRejected notInControl(ClientConnection client) {
+        String controller = authority.name();
+        return new CommandRejected(Code.NOT_IN_CONTROL, "controller", controller, "",
+                controller.length() == 0 ? "nobody controls the robot"
+                        : controller.equals(client.name()) ? "another client named " + controller
+                                + " controls the robot; give each client a name of its own"
+                        : controller + " controls the robot, not " + client.name());
     }
 
     private void fail(ClientConnection client, int type, long request, Throwable e) {

@@ -69,8 +69,7 @@ public final class RobotService {
 
     /** Stop whatever moves, for a reason that its clients receive. */
     public void stop(String why) {
-        executor.endAll(Cause.STOPPED, why);
-        robot.motion.stop();
+        executor.stopAll(Cause.STOPPED, why);
     }
 
     /** End all motions and stop the robot; no motion starts after that. */

@@ -4,6 +4,7 @@ import java.util.Map;
 import java.util.concurrent.ConcurrentHashMap;
 
 import heptarm.core.Clock;
+import heptarm.core.FailureLog;
 import heptarm.core.Log;
 import heptarm.core.Threads;
 import heptarm.core.robot.Robot;
@@ -157,19 +158,18 @@ public final class StateSampler {
     }
 
     private void work() {
-        boolean failing = false;
+        FailureLog failures = new FailureLog(log);
         try {
             while (!closed) {
                 awaitSubscriber();
                 long now = clock.sleepUntilReadable(next());
                 try {
                     serve(now);
-                    failing = false;
-                } catch (RuntimeException e) {
-                    if (!failing) { // once, not fifty times a second: a cabinet's log is slow
-                        log.error("reading the robot's state", e);
-                    }
-                    failing = true;
+                    failures.succeeded();
+                } catch (InterruptedException e) {
+                    throw e;
+                } catch (Throwable e) { // also a method that this cabinet lacks
+                    failures.failed("reading the robot's state", e);
                     clock.sleepUntil(clock.nanos() + IDLE_NS);
                 }
             }
