@@ -131,6 +131,20 @@ def test_start_at_the_smartpad_lets_a_paused_motion_go_on(safe: Arm) -> None:
     assert handle.wait(timeout=20.0).arrived
 
 
+def test_a_pause_of_the_operator_stays_when_control_is_taken(safe: Arm) -> None:
+    safe.release_control()
+    safe.operator.do("pause")
+    safe.wait_until(lambda s: s.safety.paused, timeout=20.0)
+    time.sleep(0.5)  # a motion that begins while the speed goes to 0 moves until then
+    safe.take_control()
+    handle = safe.start(ptp(AWAY))
+    rests = safe.state
+    time.sleep(0.3)
+    assert not handle.done and np.abs(safe.state.q - rests.q).max() < 1e-3
+    safe.operator.start()
+    assert handle.wait(timeout=20.0).arrived
+
+
 def test_t1_is_slow(safe: Arm) -> None:
     safe.operator.choose("t1")
     safe.operator.hold()

@@ -27,6 +27,7 @@ public final class ControlAuthority {
     private double watchdog;
     private OnLost onLost;
     private boolean leaving;
+    private boolean isPausedByClient;
 
     /** A session that may control the robot. */
     interface Controller {
@@ -77,10 +78,11 @@ public final class ControlAuthority {
         }
         boolean changed = controller == null;
         if (changed && executor.status().id == 0) {
-            // a pause and the speed override belong to a controller; the next one starts without them
-            if (!safety.isHolding()) { // a stop must stay
+            // a client's pause and the speed override belong to a controller; the next one starts without them
+            if (isPausedByClient && !safety.isHolding()) { // a stop must stay, and so must the operator's pause
                 port.resume();
             }
+            isPausedByClient = false;
             port.setOverride(1.0);
         }
         controller = client;
@@ -89,6 +91,11 @@ public final class ControlAuthority {
         if (changed) {
             events.publish(new ControlChanged(client.name(), client.session(), "took control"));
         }
+    }
+
+    /** A client has paused the robot, or lets it go on. */
+    synchronized void paused(boolean byClient) {
+        isPausedByClient = byClient;
     }
 
     void release(Controller client, String why) {

@@ -9,10 +9,13 @@ import heptarm.wire.GetDatagramStatistics;
 import heptarm.wire.Message;
 import heptarm.wire.Messages;
 import heptarm.wire.OpenDatagrams;
+import heptarm.wire.Pause;
 import heptarm.wire.Ping;
 import heptarm.wire.Pong;
+import heptarm.wire.Recover;
 import heptarm.wire.Rejected;
 import heptarm.wire.ReleaseControl;
+import heptarm.wire.Resume;
 import heptarm.wire.SessionState;
 import heptarm.wire.SessionTransitions;
 import heptarm.wire.Stop;
@@ -145,6 +148,9 @@ final class RequestDispatcher {
         if (CommandHandler.begins(message) && !authority.isController(client)) {
             commands.withdraw(message, ((Accepted) answer).id);
             throw notInControl(client);
+        }
+        if (message instanceof Pause || message instanceof Resume || message instanceof Recover) {
+            authority.paused(message instanceof Pause);
         }
         return answer;
     }
