@@ -280,8 +280,8 @@ def test_control_becomes_free_even_if_the_robot_cannot_be_stopped(make: Callable
         assert finished(after, accepted).cause in (wire.Cause.STOPPED, wire.Cause.LOST)
 
 
-@pytest.mark.parametrize("way", ["stop", "fast", "lost"])
-def test_the_arm_stops_before_what_waits_is_cancelled(make: Callable[..., FakeCabinet], way: str) -> None:
+@pytest.mark.parametrize("ending", ["stop", "fast", "lost"])
+def test_the_arm_stops_before_what_waits_is_cancelled(make: Callable[..., FakeCabinet], ending: str) -> None:
     """Each cancellation is a call to the robot; a thousand items must not be cancelled before the moving one stops."""
     cabinet = make(getter=0.01)
     with Peer(cabinet.port, name="observer") as observer, Peer(cabinet.port, name="controller") as peer:
@@ -292,12 +292,12 @@ def test_the_arm_stops_before_what_waits_is_cancelled(make: Callable[..., FakeCa
         behind = peer.ask(run(ptp(0.0)))
         time.sleep(0.1)  # all of it has been handed over
         asked = time.monotonic() - began
-        if way == "lost":
+        if ending == "lost":
             peer.close()
         else:
-            observer.send(wire.Stop(kind=wire.StopKind.PATH if way == "stop" else wire.StopKind.FAST), 1)
+            observer.send(wire.Stop(kind=wire.StopKind.PATH if ending == "stop" else wire.StopKind.FAST), 1)
         end = finished(observer, accepted)
-        assert end.cause == (wire.Cause.LOST if way == "lost" else wire.Cause.STOPPED)
+        assert end.cause == (wire.Cause.LOST if ending == "lost" else wire.Cause.STOPPED)
         assert end.q[0] < min(asked + 1.0, 2.8), "it moved on while the others were cancelled"
         assert finished(observer, behind).cause == end.cause
         assert not observer.all(wire.ItemReached)

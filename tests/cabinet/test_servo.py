@@ -178,14 +178,14 @@ def test_one_that_ended_by_itself_is_begun_again_with_the_next_target(cabinet: F
 
 
 def test_one_that_is_begun_again_has_the_changed_mode(cabinet: FakeCabinet) -> None:
-    stiff, soft = (
+    stiff, compliant = (
         wire.JointImpedance(stiffness=(value,) * 7, damping=(0.7,) * 7) for value in (1000.0, 50.0)
     )
     with controller(cabinet.port) as peer:
         servo = opened(peer, watchdog=2.0, mode=stiff)
         assert peer.ask(wire.GetProcessData(name="servo")).value == "1000.0"
         peer.send(target(servo, 0.1))
-        assert isinstance(peer.ask(wire.ServoSettings(servo=servo, mode=soft)), wire.Accepted)
+        assert isinstance(peer.ask(wire.ServoSettings(servo=servo, mode=compliant)), wire.Accepted)
         reached(peer, 0.1)
         time.sleep(0.6)  # the fake's servo motions end after 0.3 s without a target
         peer.send(target(servo, 0.4))

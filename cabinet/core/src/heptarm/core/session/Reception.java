@@ -139,7 +139,7 @@ final class Reception {
                     log.warn("a connection was not accepted: " + e);
                     Threads.pause(); // a cause such as too many open files does not vanish at once
                 }
-            } catch (Throwable e) { // the memory is used up, say: whoever comes later needs this thread
+            } catch (Throwable e) { // the memory is used up, say: clients that come later need this thread
                 failures.failed("accepting a connection", e);
                 if (peer == null) {
                     Threads.pause();
@@ -150,7 +150,7 @@ final class Reception {
         }
     }
 
-    /** Take in a connection; one that its peer has reset already is closed at once, since whoever stops the arm may be next. */
+    /** Take in a connection; one that its peer has reset already is closed at once, since a stop of the arm may be next. */
     private void welcome(Socket peer) {
         try {
             peer.setTcpNoDelay(true);
