@@ -210,7 +210,7 @@ def test_the_command_between_two_arms_records_joints_and_gripper_to_its_end(tmp_
             time.sleep(3.0)
             assert leader.operate("set MediaFlange.UserButton true") == ("", "")
             said = process.communicate(timeout=120)[0]
-        assert process.returncode == 0 and "1 episodes in" in said, said
+        assert process.returncode == 0 and "1 episode in" in said, said
         (episode,) = ha.load_episodes(tmp_path / "set")
         began, ended = episode["pose"][0, :3], episode["pose"][-1, :3]
         assert ended[1] - began[1] > 0.01 and episode.task == "Look"
@@ -253,7 +253,7 @@ def test_the_command_follows_a_phone_with_a_tool_within_the_workspace(tmp_path: 
                 time.sleep(0.1)
             phone.close()
             said = process.communicate(timeout=120)[0]
-        assert process.returncode == 0 and "1 episodes in" in said, said
+        assert process.returncode == 0 and "1 episode in" in said, said
         (episode,) = ha.load_episodes(tmp_path / "set")
         flange = np.array([forward(robot("iiwa14"), q)[:3, 3] for q in episode["q"]])
         lengths = np.linalg.norm(episode["pose"][:, :3] - flange, axis=1)
