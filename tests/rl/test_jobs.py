@@ -14,7 +14,7 @@ pytest.importorskip("torch", reason="torch is not installed")
 
 import heptarm as ha
 from heptarm.cli.rl import policies
-from heptarm.cli.rl.jobs import JobOptions, cases_of, table_at
+from heptarm.cli.rl.jobs import JobOptions, cases_of
 from heptarm.cli.rl.record import _keep
 from heptarm.errors import CommandRejected, LimitError
 from heptarm.rl.contact.peg_in_hole import PegInHole
@@ -23,6 +23,7 @@ from heptarm.rl.sim.randomisation import STRONG
 from heptarm.rl.sweep import sweep, with_setting, with_settings
 from heptarm.rl.task import ReachTask
 from heptarm.rl.train.recipe import Recipe
+from heptarm.values.files import writable_file
 from tests.cli.running import objects, refused
 from tests.rl.test_pool import Square
 
@@ -92,7 +93,7 @@ def test_a_job_whose_result_cannot_be_kept_leaves_the_others(
             raise OSError(28, "No space left on device")
         return {"square": value}
 
-    table = table_at(tmp_path / "new" / "squares", overwrite=False)
+    table = writable_file(tmp_path / "new" / "squares.csv", overwrite=False)
     assert JobOptions(workers=1).run(cases, figures, table=table) == 1
     with table.open(encoding="utf-8") as file:
         rows = list(csv.DictReader(file))

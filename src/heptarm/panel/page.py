@@ -603,9 +603,8 @@ class ArmPage:
         """End what a page has started that was closed."""
         self.model.end_jog(client)
         for what, end in ((_RUN, self.model.end_run), (_MEASUREMENT, self.model.wizard.close)):
-            if (
-                self._pages.get(what) == client
-            ):  # it asks the cabinet, for which viser's event loop must not wait
+            if self._pages.get(what) == client:
+                # it asks the cabinet, for which viser's event loop must not wait
                 threading.Thread(target=self._do, args=(end,), daemon=True).start()
 
 

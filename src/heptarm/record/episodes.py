@@ -27,7 +27,7 @@ from heptarm.record.mcap_file import RecordingFile
 from heptarm.record.recorder import Recorder, RecordSource
 from heptarm.values.camera import Picture
 from heptarm.values.checks import finite_entries, instance, integer, numbers, shown, within
-from heptarm.values.files import unwritable
+from heptarm.values.files import make_folder
 from heptarm.values.frames import check_printable
 from heptarm.values.sealed import Sealed
 from heptarm.values.text import counted, printable
@@ -323,10 +323,7 @@ class EpisodeSet(Sealed):
             MissingExtra: a package that cameras or recordings need is not installed.
         """
         require("mcap.writer", extra="record")
-        try:
-            self.folder.mkdir(parents=True, exist_ok=True)
-        except OSError as error:
-            raise unwritable(self.folder, error) from error
+        make_folder(self.folder)
         clock = self._source.nanos
         cameras: list[_Watcher] = []
         with ExitStack() as stack:

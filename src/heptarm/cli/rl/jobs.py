@@ -19,7 +19,7 @@ from heptarm.cli.output import emit
 from heptarm.errors import CommandRejected, HeptarmError
 from heptarm.rl.pool import Job, JobResult, run_jobs
 from heptarm.rl.sweep import sweep
-from heptarm.values.files import unwritable, writable_file
+from heptarm.values.files import unwritable
 
 JOBS = Group("Many at once")
 Seeds = Annotated[
@@ -97,10 +97,7 @@ class JobOptions:
             if not error:
                 try:
                     found = figures(result.job, result.value)
-                except (
-                    HeptarmError,
-                    OSError,
-                ) as failure:  # of one job, such as a full disk; the others go on
+                except (HeptarmError, OSError) as failure:  # such as a full disk; the others go on
                     error = str(failure)
             about = {"seconds": result.seconds, "attempts": result.attempts, "worker": result.worker}
             row = rows[id(result.job)] = {**facts[id(result.job)], **found, **about, "error": error}
@@ -128,15 +125,6 @@ class JobOptions:
                 raise unwritable(table, failure, name="out") from failure
             print(f"written: {table}", file=sys.stderr)
         return int(any(row["error"] for row in ordered))
-
-
-def table_at(out: Path, *, overwrite: bool) -> Path:
-    """The file of a table, which can be written, before anything runs.
-
-    Raises:
-        CommandRejected: it exists, or cannot be written.
-    """
-    return writable_file(out.with_suffix(".csv"), overwrite=overwrite, name="out")
 
 
 #: Nothing was given on the command line.

@@ -11,7 +11,7 @@ from cyclopts import Parameter
 
 from heptarm.cli.options import Json, Model, Overwrite
 from heptarm.cli.output import emit
-from heptarm.cli.rl.jobs import HERE, JobOptions, Seeds, Sweeps, cases_of, name_of, table_at
+from heptarm.cli.rl.jobs import HERE, JobOptions, Seeds, Sweeps, cases_of, name_of
 from heptarm.cli.rl.options import LARGEST_SEED, POLICY, Seed
 from heptarm.cli.rl.reports import refuse_reports, write_report
 from heptarm.errors import CommandRejected, require
@@ -23,7 +23,7 @@ from heptarm.rl.sweep import with_setting, with_settings
 from heptarm.rl.task import ReachTask
 from heptarm.rl.tasks import task_named
 from heptarm.values.checks import integer
-from heptarm.values.files import refuse_existing
+from heptarm.values.files import refuse_existing, writable_file
 from heptarm.values.fitted_arm import load_fitted
 
 if TYPE_CHECKING:
@@ -184,7 +184,7 @@ def _train_jobs(
         job.name: out.with_name(f"{out.stem}-{job.name.replace('=', '').replace(' ', '-')}.npz")
         for _, job in made
     }
-    table = table_at(out, overwrite=overwrite)
+    table = writable_file(out.with_suffix(".csv"), overwrite=overwrite, name="out")
     for file in (*files.values(), *(path.with_suffix(".png") for path in files.values())):
         refuse_existing(file, overwrite=overwrite, name="out")
 
@@ -268,7 +268,9 @@ def evaluate(
     integer(episodes, "--episodes", 1, _EPISODES)
     integer(seed, "--seed", 0, LARGEST_SEED)
     if len(policies) > 1 or seeds or sweep or jobs != HERE:
-        table = None if out is None else table_at(out, overwrite=overwrite)
+        table = (
+            None if out is None else writable_file(out.with_suffix(".csv"), overwrite=overwrite, name="out")
+        )
         cases = [
             _evaluation(
                 str(policy), {"seed": number, "randomisation": randomisation, **settings}, episodes, engine

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
@@ -96,14 +97,17 @@ def record(
 def _keep(folder: Path, episode: RecordedEpisode) -> None:
     """Write an episode; one that another program has recorded under its number meanwhile stays."""
     number = episode.number
-    while True:
-        file = folder / f"episode-{number:05d}.mcap"
-        try:
-            file.open("xb").close()  # takes the name
-        except FileExistsError:
-            number = next_number(folder)
-        else:
-            break
-    half = file.with_suffix(".part")
-    half.write_bytes(episode.content)
-    half.replace(file)
+    half = folder / f"episode-{number:05d}-{os.getpid()}.part"
+    try:
+        half.write_bytes(episode.content)
+        while True:
+            file = folder / f"episode-{number:05d}.mcap"
+            try:
+                file.open("xb").close()  # takes the name
+                break
+            except FileExistsError:
+                number = next_number(folder)
+        half.replace(file)
+    except OSError:  # a full disk leaves no half of an episode
+        half.unlink(missing_ok=True)
+        raise

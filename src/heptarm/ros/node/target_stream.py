@@ -96,9 +96,8 @@ class TargetStream:
         self._guard: Condition | None = None
         self._blocked = ""  # what ended the last servo motion; setting a guard clears it
         self._quiet = threading.Lock()  # of `_held_off`; never held while something is sent
-        self._held_off: int | None = (
-            None  # when the last target came after `hold_off` [ns]; None: all are followed
-        )
+        #: When the last target came after `hold_off` [ns]; None: all are followed.
+        self._held_off: int | None = None
         self._opened: dict[str, Any] = {}  # how the open servo motion was opened
         self._again: Callable[[], object] | None = None  # sends the newest target again
 
